@@ -30,7 +30,17 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import analyze, fidelity, pareto, plan, render, report, revise, sweep
+from factory.studies import (
+    analyze,
+    env,
+    fidelity,
+    pareto,
+    plan,
+    render,
+    report,
+    revise,
+    sweep,
+)
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
@@ -47,6 +57,7 @@ __all__ = [
     "analyze",
     "build",
     "compile",
+    "env",
     "export",
     "fidelity",
     "lay_out",

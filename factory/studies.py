@@ -6,13 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from factory.stages import AnyPath, Stage, maybe, named, path_of, project_of
 from factory.support.guard import guarding, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
+    import gymnasium
+
     from factory.apps.analyze import Analysis
     from factory.apps.fidelity.record import Fidelity
     from factory.apps.pareto import ParetoFront
@@ -42,7 +44,7 @@ def render(
     output: AnyPath,
     *,
     size: tuple[int, int] = (1280, 720),
-    camera: str = "overview",
+    camera: str = "tour",
     panels: Sequence[PanelName] = (),
     title: str = "",
     fps: float = 30,
@@ -60,7 +62,7 @@ def render(
     """Film a run (.mp4), or take a still of it (.png) at a time [s] or at its end; of a log, of the
     run that is in it.
 
-    `size` (width, height) [px]; `camera`: overview, orbit, top, product, part:LABEL or
+    `size` (width, height) [px]; `camera`: tour, overview, orbit, top, product, part:LABEL or
     handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment;
     `renderer`: classic, filament, or auto, which takes filament for stills where it works.
     The others are those of `run`. Raises InputError, MissingError without GL, RunError.
@@ -346,3 +348,51 @@ def plan(
         raise InputError(refusal(planned))
     files = write_planned(placed, planned, path_of(output), file, passing, operations)
     return PlannedAssembly(read(files[0], templates).pag, planned, files)
+
+
+def env(
+    product: Stage,
+    *,
+    units: int = 4,
+    jitter: float = 0.0,
+    interval: float = 0.1,
+    max_time: float = 300.0,
+    worlds: int | None = None,
+    render_mode: Literal["rgb_array"] | None = None,
+    settings: Settings | None = None,
+) -> gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]:
+    """The factory of a product as a Gymnasium environment, in which an agent commands the plant
+    with setpoints, grips and jobs; several `worlds` as a vector environment.
+
+    An episode makes `units` products, each with a reward of 1, in steps of `interval` [s], within
+    `max_time` [s]. `factory.apps.environment.plant.FactoryEnv` says what is seen and commanded;
+    `factory.apps.environment.programs.Programs` is the baseline. Raises InputError, MissingError
+    without the extra `gym`.
+
+    >>> import factory
+    >>> plant = factory.env("examples/paper.pag", units=1)
+    >>> seen, info = plant.reset(seed=0)
+    >>> seen["position"].shape, seen["legal"].shape
+    ((6,), (6, 8))
+    """
+    from factory.engine.simulation.request import RunRequest
+    from factory.engine.simulation.simulation import Simulation
+    from factory.support.version import optional
+
+    gym = optional("gymnasium", "gymnasium", "an environment", "gym")
+    from factory.apps.environment.plant import FactoryEnv
+
+    project, shown = project_of(product, settings), render_mode is not None
+    request = RunRequest(
+        units=units,
+        jitter=jitter,
+        settings=project.settings,
+        catalogue=project.catalogue,
+        shown=shown,
+    )
+    first = Simulation(project.layout, request)
+
+    def made() -> gymnasium.Env[Any, Any]:
+        return FactoryEnv(first, interval, max_time, render_mode)
+
+    return made() if worlds is None else gym.vector.SyncVectorEnv([made] * worlds)

@@ -49,6 +49,7 @@ APPS = (
     ("report",),
     ("pareto", "live"),
     ("plc",),
+    ("environment",),
 )
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""

@@ -227,7 +227,7 @@ RELAY = options(
         "--seconds",
         "limit",
         type=SECONDS,
-        help="Time limit of the search for few robots [s]; a search that it cuts short says so.",
+        help="Time limit of the search for few robots [s]; a message says if it was reached.",
     ),
 )
 WIP = click.option(
@@ -245,7 +245,7 @@ LIBRARY = click.option(
 LENIENT = click.option(
     "--lenient",
     is_flag=True,
-    help="Let a run that makes its units succeed, whatever its bodies do.",
+    help="Accept a run that makes its units, whatever the verdict on its bodies.",
 )
 STRICT = click.option("--strict", is_flag=True, help="Fail a run that 'succeeded, but ...'.")
 DRAW = options(
@@ -288,11 +288,12 @@ PICTURE = options(
     click.option("--fps", type=bounded("fps"), default=30, help="Frames per second."),
     click.option(
         "--camera",
-        default="overview",
+        default="tour",
         metavar="CAMERA",
         shell_complete=cameras,
-        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a"
-        " close-up of its hand-over.",
+        help="tour (of a film: the overview, cut to two hand-overs and the product), overview,"
+        " orbit, top, product, part:LABEL to follow a part, or handover:LABEL for a close-up of its"
+        " hand-over.",
     ),
     click.option(
         "--with",

@@ -46,7 +46,10 @@ def render(
     output: Path,
     at: str,
 ) -> int:
-    """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
+    """Film a run of FILE.pag, or the run in a LOG.
+
+    `run --log` writes a LOG. Pictures are drawn headless, through EGL.
+    """
     from factory.apps.log import is_log
     from factory.apps.runs.pictures import render as taken
     from factory.film.shot import Shot

@@ -37,6 +37,9 @@ ROUND = 0.03
 STANDS = ("post", "boom")
 """Geoms of a feeder that fade."""
 
+SHED = ("outfeed/roof", "outfeed/back", "outfeed/wall")
+"""Geoms of the shed, by what their names begin with."""
+
 
 class Fading:
     """Fades geoms of a replica of the model."""
@@ -141,12 +144,20 @@ Own = tuple[int, str]
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """What a picture of a factory has to show, as boxes (n, 8, 3) by their corners [m]: its
-    `robots`, and what they carry, at both ends of their guidepaths; `beside` these the feeders that
-    parts hang from at first, and the tray with a product, empty and where it goes into the shed."""
+    """What a picture of a factory has to show, as boxes (n, 8, 3) by their corners [m].
+
+    Attributes:
+        robots: robots, and what they carry, at both ends of their guidepaths.
+        beside: the feeders that parts hang from at first, with their rods down and up, and the tray
+            with a product, empty and where it goes into the shed.
+        housings: the housings of feeders.
+        shed: the shed and its shutter.
+    """
 
     robots: Array
     beside: Array
+    housings: Array
+    shed: Array
 
     @property
     def points(self) -> Array:
@@ -160,15 +171,49 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     for owner, corners_of in (*_bodies(m, d), *_loads(m, d)):
         points[owner].append(corners_of)
     boxes = {owner: box_of(np.concatenate(corners_of)) for owner, corners_of in points.items()}
-    beside = [placed(m, d, g) for g in range(m.ngeom) if names.kind(m.geom(g).name) == "feeder"]
+    beside = list(_feeders(m, d))
     robots: list[Array] = []
     for (body, _), box in boxes.items():
         way = _way(m, d, body, boxes.get((body, "load"), box))
         is_tray = m.body(body).name == names.OUTFEED_TRAY
         (beside if is_tray else robots).extend((box, box + way))
-    return Action(
-        *(np.array(corners_of).reshape(-1, 8, 3) for corners_of in (robots or beside, beside))
-    )
+    kinds = robots or beside, beside, list(_housings(m, d)), list(_shed(m, d))
+    return Action(*(np.array(corners_of).reshape(-1, 8, 3) for corners_of in kinds))
+
+
+def _feeders(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[Array]:
+    """Boxes of the geoms of feeders, those of sliders down and up."""
+    for g in range(m.ngeom):
+        if names.kind(m.geom(g).name) != "feeder":
+            continue
+        yield (box := placed(m, d, g))
+        if up := _raised(m, int(m.body_weldid[m.geom_bodyid[g]])):
+            yield box + np.array([0.0, 0.0, up])
+
+
+def _raised(m: mujoco.MjModel, body: int) -> float:
+    """How far up a body goes on its joint [m], 0 for one that stands."""
+    return float(m.jnt_range[m.body_jntadr[body], 1]) if m.body_jntnum[body] else 0.0
+
+
+def _housings(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[Array]:
+    """The box of each feeder's housing."""
+    for body in range(1, m.nbody):
+        if names.kind(m.body(body).name) == "feeder" and m.body_weldid[body] == 0:
+            first = int(m.body_geomadr[body])
+            geoms = range(first, first + int(m.body_geomnum[body]))
+            walls = [placed(m, d, g) for g in geoms if not is_stand(m.geom(g).name)]
+            if walls:
+                yield box_of(np.concatenate(walls))
+
+
+def _shed(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[Array]:
+    """The box of the shed, and that of its shutter."""
+    geoms = [(m.geom(g).name, g) for g in range(m.ngeom)]
+    walls = [placed(m, d, g) for name, g in geoms if name.startswith(SHED)]
+    if walls:
+        yield box_of(np.concatenate(walls))
+    yield from (placed(m, d, g) for name, g in geoms if name == names.SHUTTER)
 
 
 def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:

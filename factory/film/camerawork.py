@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import floor
+from math import floor, inf
 from typing import Literal
 
 import numpy as np
@@ -22,7 +22,8 @@ from factory.film.marks import Marks
 from factory.film.net_panel import NetPanel
 from factory.film.painter import Painter, Renderer
 from factory.film.picture import Area, PanelName, Picture, Size, shared
-from factory.film.sheet import OUTSIDE, Rows
+from factory.film.sheet import NAMES, OUTSIDE, Rows
+from factory.film.tour import Tour
 from factory.floor.geometry.sight import Framing
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
@@ -84,15 +85,18 @@ class Camerawork(Closing):
     def __init__(self, take: Take, samples: int = 1) -> None:
         self.take, self.still, picture = take, samples > 1, take.picture
         area, areas = shared(picture.size, picture.panels)
-        size = area.width, area.height
+        size, is_tour = (area.width, area.height), picture.camera == "tour"
+        camera = "overview" if is_tour else picture.camera
         self.caption = Caption(size) if picture.caption else None
         self.panels = Panels(take.m, picture.size, areas, take.history) if areas else None
         share = self.caption.share if self.caption else 0.0
         filament = draws(picture.renderer, self.still)
-        model = drawn(take.m, take.xml, take.files, picture.camera, filament)
-        renderer = Filament if filament else Renderer
         look = Framing(size[0] / size[1], below=0.03 + share)
-        self.painter = Painter(model, size, picture.camera, take.subject, look, samples, renderer)
+        model = drawn(take.m, take.xml, take.files, camera, filament, look)
+        renderer = Filament if filament else Renderer
+        self.painter = Painter(model, size, camera, take.subject, look, samples, renderer)
+        if is_tour and not self.still:
+            self.painter.viewpoint = Tour(self.painter.replica, look, take.history, take.units)
         self.marks = Marks(self.painter.replica, take.history)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:
@@ -128,7 +132,8 @@ class Panels:
     ) -> None:
         scale = min(max(size) / 1280, min(size) / 720)
         room = min(area.height for area in areas.values()) / max(scale, SMALLEST) - OUTSIDE
-        self.size, self.rows = size, Rows(history, room)
+        wide = areas["net"].width / max(scale, SMALLEST) - NAMES if "net" in areas else inf
+        self.size, self.rows = size, Rows(history, room, wide)
         self.shown = [
             (area, KINDS[name]((area.width, area.height), scale, history, self.rows))
             for name, area in areas.items()

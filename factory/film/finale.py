@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from factory.film.camerawork import Camerawork, Moment, Take
 from factory.film.caption import draw_title
 from factory.film.ink import Pixels
 from factory.film.picture import orbit
-from factory.floor.geometry.sight import Framing
+from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.theory.lang.source import counted
@@ -29,9 +29,29 @@ MARGINS = 0.16
 """Free at each edge of the picture, as a fraction of its height."""
 
 
-def finale(take: Take, whole: Moment, last: Moment, fps: float) -> Iterator[Pixels]:
+class Turntable:
+    """The viewpoint of what turns: it is seen from all sides in turn.
+
+    Args:
+        points: its corners (n, 3) [m].
+        framing: the usable area of the picture.
+    """
+
+    concerned = None
+
+    def __init__(self, points: Array, framing: Framing) -> None:
+        self.watched, self.goes = points.reshape(-1, 8, 3), orbit(points, framing, TURN)
+
+    def view(self, shown: Snapshot, elapsed: float, time: float) -> View:
+        """The view at a time [s]."""
+        return self.goes(time)
+
+
+def finale(
+    take: Take, whole: Moment, last: Moment, fps: float, contacts: int | None
+) -> Iterator[Pixels]:
     """The pictures of the product that was `whole` at a moment, for a film that has come to its
-    `last`."""
+    `last` moment with so many unintended contacts, None where that is not known."""
     size = take.picture.size
     alone = replace(take, picture=replace(take.picture, camera="overview", panels=()))
     with Camerawork(alone) as work:
@@ -42,19 +62,21 @@ def finale(take: Take, whole: Moment, last: Moment, fps: float) -> Iterator[Pixe
         shown, points = _on_the_floor(replica, whole.shown, bodies)
         _leave_only(replica.m, bodies)
         framing = Framing(size[0] / size[1], MARGINS, MARGINS, MARGINS)
-        painter.viewpoint.goes = orbit(points, framing, TURN)
+        painter.viewpoint = Turntable(points, framing)
         title = take.picture.title or take.product
-        made = f"{last.made} of {counted(take.units, 'unit')}, {counted(_parts(take), 'part')} each"
+        parts = _parts(take, [replica.m.body(body).name for body in bodies])
+        said = [f"{last.made} of {counted(take.units, 'unit')}", f"{counted(parts, 'part')} each"]
+        said += [] if contacts is None else [counted(contacts, "unintended contact")]
         for frame in range(round(LASTS * fps)):
             pixels = painter.paint(shown, time=frame / fps)
-            draw_title(pixels, title, made, 0.0)
+            draw_title(pixels, title, ", ".join(said), 0.0)
             yield pixels
 
 
-def _parts(take: Take) -> int:
-    """Number of parts of a product."""
-    factory = take.subject.factory
-    return len(factory.contents[next(iter(factory.products))])
+def _parts(take: Take, bodies: Iterable[str]) -> int:
+    """Number of parts of the product that bodies, by name, make up."""
+    contents = take.subject.factory.contents
+    return sum(len(contents[names.label_of(body)]) for body in bodies)
 
 
 def _product(m: mujoco.MjModel, shown: Snapshot) -> set[int]:

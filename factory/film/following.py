@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica
 from factory.engine.record.subject import MonitorSubject
-from factory.film.action import SIGNS, Snapshot, action_of, corners
+from factory.film.action import SIGNS, Action, Snapshot, action_of, corners
 from factory.film.hero import clear_the_way, free_side
-from factory.film.junction import handover_view
-from factory.film.picture import HANDOVER, PART, Camera, from_above, orbit, overview
+from factory.film.junction import Handover, handover_of
+from factory.film.picture import HANDOVER, PART, Camera, from_above, orbit
+from factory.film.vantage import overview
 from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
@@ -28,6 +30,23 @@ LAG = 0.25
 
 NEAR = 0.02
 """A body in the place of one that is gone is the same product where it is no further [m]."""
+
+
+class Lookout(Protocol):
+    """Where the camera of consecutive pictures stands.
+
+    Attributes:
+        watched: boxes (n, 8, 3) around the subject of the last view, by their corners [m].
+        concerned: the names of the robots that a hand-over concerns; None for all robots.
+    """
+
+    @property
+    def watched(self) -> Array: ...
+    @property
+    def concerned(self) -> frozenset[str] | None: ...
+    def view(self, shown: Snapshot, elapsed: float, time: float) -> View:
+        """The view at a time, `elapsed` [s] after the last, of the replica's state."""
+        ...
 
 
 class Viewpoint:
@@ -46,13 +65,16 @@ class Viewpoint:
         self.replica, self.d, self.framing = replica, replica.d, framing
         self.is_hero = still and camera == "product"
         action = action_of(replica.m, replica.d)
-        self.watched, self.points = action.robots, action.points
+        self.watched: Array = action.robots
+        self.points = action.points
+        self.handover: Handover | None = None
         if camera.startswith(HANDOVER):
             label = camera.removeprefix(HANDOVER)
-            self.watched, near = handover_view(replica, subject, label, framing)
-            self.goes: Callable[[float], View] = lambda time: near
+            near = self.handover = handover_of(replica, subject, label, framing)
+            self.watched = near.watched
+            self.goes: Callable[[float], View] = lambda time: near.view
         else:
-            self.goes = _standing(camera, self.points, framing)
+            self.goes = _standing(camera, action, framing)
         self.followed: Followed | None = None
         if camera == "product" or camera.startswith(PART):
             part = camera.removeprefix(PART) if ":" in camera else ""
@@ -60,6 +82,11 @@ class Viewpoint:
         self.wanted: Array | None = None
         self.body = -1
         self.away, self.glide = np.zeros(3), np.zeros(3)
+
+    @property
+    def concerned(self) -> frozenset[str] | None:
+        """The names of the robots that a hand-over concerns; None for all robots."""
+        return self.handover.robots if self.handover else None
 
     def view(self, shown: Snapshot, elapsed: float, time: float) -> View:
         """The view at a time, `elapsed` [s] after the last, of the replica's state."""
@@ -101,11 +128,11 @@ class Viewpoint:
         return followed.origin(self.d, body), body
 
 
-def _standing(camera: Camera, points: Array, framing: Framing) -> Callable[[float], View]:
+def _standing(camera: Camera, action: Action, framing: Framing) -> Callable[[float], View]:
     """The view at each time [s] of a camera that follows no product."""
     if camera == "orbit":
-        return orbit(points, framing)
-    view = (from_above if camera == "top" else overview)(points, framing)
+        return orbit(action.points, framing)
+    view = from_above(action.points, framing) if camera == "top" else overview(action, framing)
     return lambda time: view
 
 

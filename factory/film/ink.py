@@ -214,6 +214,10 @@ def _covered(
     return np.asarray(np.clip(r + 0.5 - outside, 0, 1), np.float32)
 
 
+FINE = 4
+"""Words are drawn so many times as large and reduced, so that letters stand evenly."""
+
+
 @cache
 def _font(points: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
     return ImageFont.load_default(points)
@@ -222,9 +226,9 @@ def _font(points: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 @lru_cache(4096)
 def _mask(text: str, points: int) -> Coverage:
     """Coverage of a line of text, with a spare column on the right."""
-    font = _font(points)
+    font = _font(FINE * points)
     reach = ImageDraw.Draw(Image.new("L", (1, 1))).textlength(text, font)
-    picture = Image.new("L", (int(np.ceil(reach)) + 1, round(1.5 * points)))
-    draw = ImageDraw.Draw(picture)
-    draw.text((0, picture.height / 2), text, 255, font, "lm")
-    return np.asarray(picture, np.float32) / np.float32(255)
+    size = int(np.ceil(reach / FINE)) + 1, round(1.5 * points)
+    picture = Image.new("L", (FINE * size[0], FINE * size[1]))
+    ImageDraw.Draw(picture).text((0, picture.height / 2), text, 255, font, "lm")
+    return np.asarray(picture.reduce(FINE), np.float32) / np.float32(255)

@@ -1,13 +1,14 @@
 """The close-up view of one hand-over.
 
 Its operation is the one that takes the label: the next in the product, or the dropoff. The camera
-stands still, and sees the label as its carrier brings it there, with the hands of all robots that
-hold something in that operation.
+stands still, and sees the label as its carrier brings it there, with the hands of the robots that
+hold something in that operation and what it is joined to, as far as the label stays large.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -26,46 +27,76 @@ from factory.theory.problem.pag import NOPART
 ROOM = 1.3
 """What a label takes of the picture is so many times its size."""
 
-ELEVATION = 6.0
-"""How high the camera stands [degrees]: hands are below what they hold, and hardly stick out."""
+ZOOM = 4.5
+"""A picture is at most about so many times as high as the label is large."""
+
+ELEVATION = 35.0
+"""How high the camera stands [degrees]: high enough to look on what is joined, and low enough to
+see the hands below it."""
 
 AZIMUTH, STEP = -62.0, 15.0
 """From where it looks if all is equal, that of an overview, and what is between the directions that
 are tried [degrees]."""
 
 
+OUTSIDE = 0.4
+"""How much it counts to look from the side on which a label is joined."""
+
 TOUCH = 1e-4
 """Penetration from which bodies count as touching [m]."""
 
 
-def handover_view(
+@dataclass(frozen=True, slots=True)
+class Handover:
+    """What a picture of a hand-over shows.
+
+    Attributes:
+        watched: the boxes (n, 8, 3) of the label and of the hands, by their corners [m].
+        view: the camera.
+        robots: the names of the robots that take part.
+        merit: how well it is seen: the more, the less is hidden and the more from aside.
+    """
+
+    watched: Array
+    view: View
+    robots: frozenset[str]
+    merit: float
+
+
+def handover_of(
     replica: Replica, subject: MonitorSubject, label: str, framing: Framing
-) -> tuple[Array, View]:
-    """The subject of the hand-over of a label, as boxes (n, 8, 3) by their corners [m], and the
-    view of it. The state of the replica is restored."""
+) -> Handover:
+    """The hand-over of a label. The state of the replica is restored."""
     factory, before = subject.factory, replica.d.qpos.copy()
     made = factory.by_label[label]
     taking = factory.operations[factory.parents[made.index]]
     _gather(replica, subject, taking)
     load = _load(replica, subject, made)
     hands, arms = _hands(replica, subject, taking)
-    stands, others = _stands(replica), _others(replica, subject, taking, made)
+    joined, limbs = _joined(replica, subject, taking, made), _limbs(replica, subject, taking)
+    stands, others = _stands(replica), np.concatenate([joined, limbs])
     replica.place(before)
     middle = load.mean(axis=0)
     reach = [hand + np.append(arm / 2, 0.0) for hand, arm in zip(hands, arms, strict=True)]
-    points = np.concatenate([middle + ROOM * (load - middle), *hands, *reach])
+    points = np.concatenate([middle + ROOM * (load - middle), *hands, *reach, *joined])
+    limit = ZOOM / 2 * float(np.ptp(load, axis=0).max())
+    if np.abs(points - middle).max() > limit:
+        points = middle + limit * np.concatenate([np.eye(3), -np.eye(3)])
     watched = np.array([load, *hands])
     tried = np.arange(AZIMUTH - 180.0, AZIMUTH + 180.0, STEP)
     views = [fit(points, towards(azimuth, ELEVATION), framing) for azimuth in tried]
     hidden = [_hidden(view, np.concatenate([stands, others]), load) for view in views]
     covered = [_covered(view, stands, middle) for view in views]
-    seen = _along(tried, arms) - hidden - covered
-    return watched, views[int(np.argmax(seen))]
+    seen = _along(tried, arms) + OUTSIDE * _outwards(tried, load, joined) - hidden - covered
+    best = int(np.argmax(seen))
+    view, merit = views[best], float(seen[best])
+    robots = frozenset(factory.robots[robot].name for robot in taking.robots)
+    return Handover(watched, replace(view, depth=view.distance), robots, merit)
 
 
 def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> None:
-    """Put the robots of an operation at their goals, with lifts down."""
-    m, qpos = replica.m, replica.d.qpos.copy()
+    """Put the robots of an operation at their goals, with lifts down as at the start."""
+    m, qpos = replica.m, replica.m.qpos0.copy()
     for robot in operation.robots:
         slide = m.joint(names.first_axis(subject.factory.robots[robot]))
         qpos[slide.qposadr[0]] = subject.goal(operation, robot)
@@ -74,13 +105,14 @@ def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> 
 
 def _load(replica: Replica, subject: MonitorSubject, made: Operation) -> Array:
     """The corners (8, 3) of the box round a label in the hands of its carrier."""
-    m, d = replica.m, replica.d
-    robot, parts = subject.factory.robots[made.carrier].name, subject.factory.contents[made.label]
-    wanted = {names.grip(robot, part) for part in parts}
+    m, d, contents = replica.m, replica.d, subject.factory.contents
+    robot, inside = subject.factory.robots[made.carrier].name, {*contents[made.label]}
+    bodies = [body for body, parts in contents.items() if inside.issuperset(parts)]
+    wanted = {names.grip(robot, body) for body in bodies}
     welds = np.array([e for e in range(m.neq) if m.equality(e).name in wanted], np.intp)
     at = held_at(m, welds, d.xpos, d.xmat)
-    bodies = m.eq_obj2id[welds].tolist()
-    return box_of(np.concatenate([p + shape_of(m, b) for p, b in zip(at, bodies, strict=True)]))
+    held = m.eq_obj2id[welds].tolist()
+    return box_of(np.concatenate([p + shape_of(m, b) for p, b in zip(at, held, strict=True)]))
 
 
 def _hands(
@@ -119,21 +151,36 @@ def _stands(replica: Replica) -> Array:
     return np.array(boxes).reshape(-1, 8, 3)
 
 
-def _others(
+def _joined(
     replica: Replica, subject: MonitorSubject, operation: Operation, made: Operation
 ) -> Array:
-    """The boxes (n, 8, 3) round what else is brought to an operation, and the limbs of its
-    robots."""
-    m, d, factory = replica.m, replica.d, subject.factory
-    loads = [
-        _load(replica, subject, factory.by_label[label])
-        for label in operation.before
-        if label in factory.by_label and label != made.label
-    ]
-    feet = {m.body(names.carriage(factory.robots[r].name)).id for r in operation.robots}
+    """The boxes (n, 8, 3) round what else is brought to an operation."""
+    by_label = subject.factory.by_label
+    labels = [x for x in operation.before if x in by_label and x != made.label]
+    loads = [_load(replica, subject, by_label[label]) for label in labels]
+    return np.array(loads).reshape(-1, 8, 3)
+
+
+def _limbs(replica: Replica, subject: MonitorSubject, operation: Operation) -> Array:
+    """The boxes (n, 8, 3) round the limbs of an operation's robots."""
+    m, d, robots = replica.m, replica.d, subject.factory.robots
+    feet = {m.body(names.carriage(robots[r].name)).id for r in operation.robots}
     solid = np.isin(m.body_rootid[m.geom_bodyid], [*feet]) & (m.geom_contype > 0)
     limbs = [placed(m, d, g) for g in np.flatnonzero(solid).tolist()]
-    return np.array([*loads, *limbs]).reshape(-1, 8, 3)
+    return np.array(limbs).reshape(-1, 8, 3)
+
+
+def _outwards(tried: Array, load: Array, joined: Array) -> Array:
+    """How far, from -1 to 1, a box (8, 3) lies to the side of directions [degrees] of the others
+    (n, 8, 3) that it is joined to."""
+    if not len(joined):
+        return np.zeros(len(tried))
+    whole = joined.reshape(-1, 3)
+    half = np.maximum(np.ptp(whole, axis=0), 1e-9) / 2
+    off = (load.mean(axis=0) - whole.min(axis=0) - half) / half
+    x, y = np.clip(off[:2], -1.0, 1.0)
+    angles = np.radians(tried)
+    return np.asarray((x * np.cos(angles) + y * np.sin(angles)) / 2**0.5)
 
 
 def _hidden(view: View, boxes: Array, load: Array) -> float:

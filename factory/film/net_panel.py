@@ -28,6 +28,7 @@ from factory.film.ink import (
     operation_colours,
     pale,
     robot_colours,
+    width,
 )
 from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
 from factory.floor.layout.layout import Point2
@@ -37,9 +38,8 @@ from factory.theory.plant.operation import Operation
 WORK = 0.66
 """Share of a column that an operation takes; the rest is for the place before it."""
 
-NARROW, NOTES = 50.0, 84.0
-"""Where operations are narrower than this at 1280x720, what each robot is doing is said beside its
-name, in so much room [px]."""
+LEAST_NOTE = 30.0
+"""Room beside a ring in which it is said what its robot is doing, at least, at 1280x720 [px]."""
 
 
 class Rings:
@@ -49,8 +49,6 @@ class Rings:
     def __init__(self, size: tuple[int, int], scale: float, rows: Rows) -> None:
         self.factory, self.rows = rows.factory, rows
         self.sheet = PanelSheet(size, scale, rows)
-        if WORK * self.pitch < NARROW * scale:
-            self.sheet = PanelSheet(size, scale, rows, notes=NOTES * scale)
 
     @property
     def radius(self) -> float:
@@ -93,6 +91,12 @@ class Rings:
             before = self.span(gear[number - 1])[1] - self.radius
             return before + 2 * share * (rest - before), y
         return self._back(self.span(gear[-1])[1] - self.radius, rest, y, 2 * share)
+
+    def ends(self, robot: int) -> tuple[float, float]:
+        """From where to where a robot's ring is in sight."""
+        gear = self.factory.robots[robot].operations
+        left, right = self.rest(gear[0]) - self.radius, self.span(gear[-1])[1]
+        return max(left, self.sheet.gutter), min(right, self.sheet.size[0] - self.sheet.edge)
 
     def within(self, operation: int, done: float) -> float:
         """Where tokens are in an operation that is so far."""
@@ -150,9 +154,9 @@ class NetPanel:
         self._move(time, active, elapsed)
         for number, (_, age) in active.items():
             self._work(ink, self.factory.operations[number], age)
-        for row in self.rows.shown if self.sheet.notes else ():
-            self._note(ink, row, time)
         self._flashes(ink, time)
+        for row in self.rows.shown:
+            self._note(ink, row, time)
         for row in self.rows.shown:
             self._token(ink, row)
         return ink.pixels
@@ -230,7 +234,7 @@ class NetPanel:
             y = self.sheet.height(row)
             ink.box(start, y - self.rings.half, end, y + self.rings.half, colour, row.alpha)
             if named and row.robot == operation.carrier:
-                name = self._name(operation, end - start + (6 if self.rings.airy else -6))
+                name = self._name(operation, self._room(operation))
                 y -= self.rings.half + 10 * self.sheet.scale if self.rings.airy else 0
                 ink.words((start + end) / 2, y, name, self.sheet.small, INK, "m", row.alpha)
 
@@ -238,11 +242,8 @@ class NetPanel:
         """What an operation does to what, as far as there is room."""
         short = operation.template.name
         long = short if short == operation.label else f"{short} {operation.label}"
-        if fitted(long, self.sheet.small, room) == long:
-            return long
-        if self.sheet.notes:
-            return ""
-        return fitted(operation.label, self.sheet.small, room)
+        whole = (name for name in (long, operation.label) if width(name, self.sheet.small) <= room)
+        return next(whole, "")
 
     def _bar(
         self,
@@ -283,7 +284,7 @@ class NetPanel:
         """An operation under way: its place lights up, a line joins its robots."""
         rows = self._rows_of(operation)
         colour = self.colours[operation.index]
-        self._place(ink, operation, pale(colour, 0.45), not self.rings.airy)
+        self._place(ink, operation, pale(colour, 0.45), named=False)
         for end in self.rings.span(operation.index):
             self._bar(ink, operation, end, BAR, 1.0)
         if len(rows) > 1:
@@ -293,15 +294,30 @@ class NetPanel:
             ink.box(x - thin, min(y), x + thin, max(y), colour, alpha)
 
     def _note(self, ink: Ink, row: PanelRow, time: float) -> None:
-        """What a robot is doing, beside its name."""
-        spell = self.history.at(row.robot, time)
-        if spell.operation:
-            number = self._operation(row.robot, spell)
-            x, y = self.sheet.gutter - self.sheet.notes, self.sheet.height(row)
-            room = self.sheet.notes - 16 * self.sheet.scale
-            label = fitted(self.factory.operations[number].label, self.sheet.small, room)
-            dark = mixed(self.colours[number], INK, 0.35)
-            ink.words(x, y, label, self.sheet.small, dark, "l", row.alpha)
+        """What a robot is doing, beside its ring, where no name is seen above the operation."""
+        spell, sheet = self.history.at(row.robot, time), self.sheet
+        if not spell.operation:
+            return
+        operation = self.factory.operations[self._operation(row.robot, spell)]
+        is_named = self.rings.airy and row.robot == operation.carrier
+        if is_named and self._name(operation, self._room(operation)):
+            return
+        left, right = self.rings.ends(row.robot)
+        free, gap = (left - sheet.gutter, sheet.size[0] - sheet.edge - right), 6 * sheet.scale
+        room = max(free) - gap
+        label = fitted(operation.label, sheet.small, room)
+        if room < LEAST_NOTE * sheet.scale or not label:
+            return
+        dark, wide = mixed(self.colours[operation.index], INK, 0.35), width(label, sheet.small)
+        x, y = left - gap - wide if free[0] > free[1] else right + gap, sheet.height(row)
+        half = 0.6 * sheet.small
+        ink.box(x - 1, y - half, x + wide + 1, y + half, GROUND, 0.85 * row.alpha)
+        ink.words(x, y, label, sheet.small, dark, "l", row.alpha)
+
+    def _room(self, operation: Operation) -> float:
+        """Room for the name of an operation."""
+        start, end = self.rings.span(operation.index)
+        return end - max(start, self.sheet.gutter) + (6 if self.rings.airy else -6)
 
     def _flashes(self, ink: Ink, time: float) -> None:
         shown = {operation.index for operation in self._operations()}
@@ -328,8 +344,7 @@ class NetPanel:
 
     def _token(self, ink: Ink, row: PanelRow) -> None:
         x, y = self._at(row)
-        if x > self.sheet.gutter - self.rings.radius:
-            ink.disc(x, y, self.rings.radius, WHITE, row.alpha)
-            ink.disc(
-                x, y, self.rings.radius - 1.4 * self.sheet.scale, self.paints[row.robot], row.alpha
-            )
+        radius, rim = self.rings.radius, 1.4 * self.sheet.scale
+        if x > self.sheet.gutter - radius:
+            ink.disc(x, y, radius, WHITE, row.alpha)
+            ink.disc(x, y, radius - rim, self.paints[row.robot], row.alpha)

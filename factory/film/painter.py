@@ -11,11 +11,12 @@ from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
 from factory.film.filament import Filament
-from factory.film.following import Viewpoint
+from factory.film.following import Lookout, Viewpoint
 from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
 from factory.film.picture import Camera, Size
 from factory.film.smoothing import smooth
+from factory.film.spotlight import Spotlight
 from factory.film.studio import GOLDEN, moved, sun
 from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
@@ -63,8 +64,8 @@ class Painter(Closing):
         quality.global_.offwidth, quality.global_.offheight = size
         quality.quality.offsamples = 0
         quality.quality.shadowsize = STILL_SHADOWS if samples > 1 else FILM_SHADOWS
-        self.viewpoint = Viewpoint(self.replica, camera, framing, subject, samples > 1)
-        self.fading = Fading(self.replica)
+        self.viewpoint: Lookout = Viewpoint(self.replica, camera, framing, subject, samples > 1)
+        self.fading, self.spotlight = Fading(self.replica), Spotlight(self.replica)
         joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
         self.shadows = sum(kind == "robot" for kind in joints) <= MANY
         self.renderer = (renderer or Renderer)(self.replica, size)
@@ -87,6 +88,7 @@ class Painter(Closing):
         mujoco.mj_camlight(self.replica.m, self.replica.d)
         view = self.viewpoint.view(shown, elapsed, time)
         self.fading.fade(view, self.viewpoint.watched)
+        self.spotlight.aim(self.viewpoint.concerned, shown)
         if self.samples == 1:
             return smooth(np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1]))
         return self.renderer.mean(view, self.samples)

@@ -14,9 +14,10 @@ from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.theory.problem.pag import PAG
 
-Standing = Literal["overview", "orbit", "top", "product"]
-"""`overview`: the whole factory, aslant; `orbit`: the same from all sides in turn; `top`: from
-above; `product`: follows the product that is furthest on its way."""
+Standing = Literal["tour", "overview", "orbit", "top", "product"]
+"""`tour`: of a film, the overview, cut to two hand-overs and at the end to the product; of a still
+the overview; `overview`: the whole factory, aslant; `orbit`: the same from all sides in turn;
+`top`: from above; `product`: follows the product that is furthest on its way."""
 
 CAMERAS: tuple[Standing, ...] = get_args(Standing)
 
@@ -61,20 +62,6 @@ def _none_of(noun: str, name: str, valid: Sequence[str]) -> InputError:
     near, every = (did_you_mean(word, valid, f"{noun}s") for word in (name, ""))
     hint = every if near == every else f"{near} {every}"
     return InputError(Diagnostic("BadValue", f"there is no {noun} '{name}'", None, hint))
-
-
-def overview(points: Array, framing: Framing) -> View:
-    """From the south, aslant, or from where the points are larger on average by a twentieth; the
-    narrower the picture, the higher up."""
-    elevation = 40.0 if framing.aspect > 1.2 else 46.0 if framing.aspect > 0.8 else 52.0
-
-    def size(view: View) -> float:
-        return float((1 / ((points - view.position) @ view.axes[2])).mean())
-
-    usual = fit(points, towards(-62.0, elevation), framing)
-    others = [fit(points, towards(a, elevation), framing) for a in range(-165, 0, 15)]
-    best = max(others, key=size)
-    return best if size(best) > 1.05 * size(usual) else usual
 
 
 def orbit(points: Array, framing: Framing, turn: float = TURN) -> Callable[[float], View]:
@@ -170,7 +157,7 @@ class Picture:
     """
 
     size: Size = (1280, 720)
-    camera: Camera = "overview"
+    camera: Camera = "tour"
     caption: bool = True
     panels: tuple[PanelName, ...] = ()
     title: str = ""

@@ -24,7 +24,8 @@ HOLD = 1.0
 class Reel(Closing):
     """Frames of a growing row of moments, at even times, into a video file, of the last one for
     HOLD, and of a product that was finished (`finale.py`); with a still of the best moment where
-    there is to be a `poster`."""
+    there is to be a `poster`. `contacts`: number of unintended contacts of the run, None where
+    unknown."""
 
     def __init__(self, take: Take, path: Path, fps: float, poster: Path | None = None) -> None:
         check_output(path, take.picture.size, fps)
@@ -34,6 +35,7 @@ class Reel(Closing):
         self.poster = None if poster is None else Poster(take, poster)
         self.take = take
         self.whole: Moment | None = None
+        self.contacts: int | None = None
         self.products = Completions(take)
         self.work = Camerawork(take)
         try:
@@ -68,7 +70,7 @@ class Reel(Closing):
             finally:
                 self.work.close()
             if self.whole is not None and self.last is not None:
-                for pixels in finale(self.take, self.whole, self.last, self.fps):
+                for pixels in finale(self.take, self.whole, self.last, self.fps, self.contacts):
                     self.file.write(pixels)
         if self.poster is not None:
             self.poster.save()

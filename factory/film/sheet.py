@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -19,8 +20,14 @@ from factory.film.ink import AMBER, EDGE, FAINT, GROUND, INK, Ink, robot_colours
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 
-CLOSE, EASY = 12.0, 26.0
+CLOSE, EASY = 18.0, 26.0
 """Least distances of rows at 1280x720 where all robots are shown, and where not [px]."""
+
+NARROW = 34.0
+"""Least width of columns where all are shown, at 1280x720 [px]."""
+
+NAMES = 60.0
+"""Room for the names of robots, at 1280x720 [px]."""
 
 ROOM = 292.0
 """For rows, in one of two panels at 1280x720 [px]."""
@@ -43,16 +50,16 @@ class PanelRow:
 
 
 class Rows:
-    """The rows at present, in so much `room` [px at 1280x720]. `reduced`: whether not all robots
-    have one; `named`: how many have, without those that fade out; `count`: for how many there are
-    places, `most` at the most; `first`: the leftmost column of operations to be seen, and `columns`
-    how many are."""
+    """The rows at present, in so much `room` for them and `across` for columns [px at 1280x720], if
+    there are any. `reduced`: whether not all robots and columns are shown; `named`: how many robots
+    are, without those that fade out; `count`: for how many there are places, `most` at the most;
+    `first`: the leftmost column of operations to be seen, and `columns` how many are."""
 
-    def __init__(self, history: History, room: float = ROOM) -> None:
+    def __init__(self, history: History, room: float = ROOM, across: float = inf) -> None:
         self.history, self.factory = history, history.factory
         robots = len(self.factory.robots)
-        self.reduced = CLOSE * robots > room
-        self.most = int(room / EASY)
+        self.reduced = CLOSE * robots > room or NARROW * self.width > across
+        self.most = min(int(room / EASY), robots)
         self.count = float(self.most if self.reduced else robots)
         self.shown = [] if self.reduced else [PanelRow(r, float(r)) for r in range(robots)]
         self.columns = min(COLUMNS, self.width) if self.reduced else self.width
@@ -133,7 +140,7 @@ def _ahead(factory: Factory, focus: Operation) -> Iterator[Operation]:
         operation = factory.operations[parent]
 
 
-TALLEST = 62.0
+TALLEST = 80.0
 """Distance of rows at 1280x720, at the most [px]."""
 
 TOP, FOOT, BOTTOM = 40.0, 22.0, 6.0
@@ -146,23 +153,22 @@ OUTSIDE = TOP + FOOT + BOTTOM
 @dataclass(frozen=True)
 class PanelSheet:
     """The measures of a panel of a size, at a scale (1 at 1280x720), over some rows; `below`: what
-    is kept free at the bottom [px], and `notes` right of the robots' names."""
+    is kept free at the bottom [px]."""
 
     size: tuple[int, int]
     scale: float
     rows: Rows
     below: float = 0.0
-    notes: float = 0.0
 
     @property
     def points(self) -> int:
         """Height of words."""
-        return max(9, round(13 * self.scale))
+        return max(11, round(14.5 * self.scale))
 
     @property
     def small(self) -> int:
         """Height of words that have to fit a row."""
-        return max(8, min(self.points - 1, int(self.pitch * 0.75)))
+        return max(9, min(self.points - 1, int(self.pitch * 0.75)))
 
     @property
     def edge(self) -> float:
@@ -182,15 +188,15 @@ class PanelSheet:
 
     @property
     def gutter(self) -> float:
-        """Where the names of robots end, and the notes."""
+        """Where the names of robots end."""
         longest = max((len(r.name) for r in self.rows.factory.robots), default=2)
         name = width("0" * longest, self.name_points)
-        return self.edge + self.points * 1.1 + name + 6 * self.scale + self.notes
+        return self.edge + self.points * 1.1 + name + 6 * self.scale
 
     @property
     def name_points(self) -> int:
         """Height of the robots' names."""
-        return max(9, min(self.points, int(self.pitch * 0.85)))
+        return max(10, min(self.points, int(self.pitch * 0.85)))
 
     def height(self, row: PanelRow) -> float:
         """The middle of a row."""

@@ -52,6 +52,8 @@ class RecordedStates(Protocol):
     def timed_entries(self) -> Any: ...
     @property
     def failures(self) -> Failures | None: ...
+    @property
+    def figures(self) -> Mapping[str, Any] | None: ...
     def row_at(self, time: float) -> int: ...
     def __len__(self) -> int: ...
 
@@ -113,6 +115,7 @@ class Shot:
                 moment = moment_of(states, row)
                 take.history.catch_up(states.timed_entries, moment.time)
                 reel.until(moment)
+            reel.contacts = (states.figures or {}).get("unintended_contacts")
         return reel.frames
 
     def _row(self, states: RecordedStates, take: Take) -> int:

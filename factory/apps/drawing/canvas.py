@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from math import floor, hypot, log10
+from itertools import pairwise
+from math import ceil, floor, hypot, log10
 from typing import TYPE_CHECKING, Any
 
 from factory.support.markup import escape, quoteattr
@@ -24,6 +25,9 @@ Box = tuple[float, float, float, float]
 
 LONGEST = 20
 """A label of more letters is cut; the whole of it is shown as a tooltip."""
+
+BLOT = 4.0
+"""Size of the spots in which lettering sees a curve."""
 
 LETTER = 0.6
 """Mean width of a letter, in font sizes."""
@@ -185,6 +189,36 @@ class Canvas:
         self.line(styles[0], start, foot)
         self.head(tip, foot, head[1], styles[1])
 
+    def curved_arrow(
+        self, points: Sequence[Point], styles: tuple[str, str], head: Point, short: float = 0.0
+    ) -> None:
+        """A smooth line through points to the right, level at both ends, with a head, so long and
+        half so wide, that ends `short` of the last; the `styles` of both. Labels are kept off
+        it."""
+        end = points[-1]
+        tip, foot = (end[0] - short, end[1]), (end[0] - short - head[0], end[1])
+        line = [*points[:-1], foot]
+        slopes = _slopes(line)
+        way = f"M{number(line[0][0])} {number(line[0][1])}"
+        for (a, b), (m, n) in zip(pairwise(line), pairwise(slopes), strict=True):
+            third = (b[0] - a[0]) / 3
+            bends = (a[0] + third, a[1] + m * third), (b[0] - third, b[1] - n * third), b
+            way += "C" + " ".join(f"{number(x)} {number(y)}" for x, y in bends)
+            self._block_between(a, b, m, n)
+        self.add("path", styles[0], d=way)
+        self.head(tip, foot, head[1], styles[1])
+
+    def _block_between(self, a: Point, b: Point, m: float, n: float) -> None:
+        """Keep labels off a cubic between two points, of these slopes there."""
+        wide, rise = b[0] - a[0], b[1] - a[1]
+        steps = max(1, ceil(hypot(wide, rise) / BLOT))
+        for step in range(steps + 1):
+            t = step / steps
+            y = a[1] + rise * t * t * (3 - 2 * t)
+            y += wide * t * (1 - t) * (m * (1 - t) - n * t)
+            x = a[0] + wide * t
+            self.block((x - BLOT / 2, x + BLOT / 2, y - BLOT / 2, y + BLOT / 2))
+
     # --- words -----------------------------------------------------------------------------------
 
     def text(
@@ -215,11 +249,14 @@ class Canvas:
         """A label about `off` away from a point, where it covers least of what is blocked; gives
         its middle. A grid of cells keeps it near linear."""
         half = len(shortened(words)) * size * LETTER / 2, size / 2
-        middles = [
-            (self._hidden(_about(middle, half)), number, middle)
-            for number, middle in enumerate(_around(at, half, off))
-        ]
-        middle = min(middles)[2]
+        return self.place_at(list(_around(at, half, off)), words, size, style)
+
+    def place_at(self, middles: Sequence[Point], words: str, size: float, style: str = "") -> Point:
+        """A label at the first of points at which it covers least of what is blocked; gives its
+        middle."""
+        half = len(shortened(words)) * size * LETTER / 2, size / 2
+        hidden = [round(self._hidden(_about(middle, half)), 6) for middle in middles]
+        middle = middles[hidden.index(min(hidden))]
         self.block(_about(middle, half))
         self.label(middle, words, size, style)
         return middle
@@ -281,6 +318,14 @@ def _attributes(attributes: dict[str, object]) -> str:
 
 def _way(points: Sequence[Point]) -> str:
     return "M" + "L".join(f"{number(x)} {number(y)}" for x, y in points)
+
+
+def _slopes(points: Sequence[Point]) -> list[float]:
+    """Slopes of a smooth line at points to the right, by which it goes up and down only where they
+    do (Fritsch and Butland 1984); level at both ends."""
+    secants = [(b[1] - a[1]) / max(b[0] - a[0], 1e-9) for a, b in pairwise(points)]
+    inner = [2 * s * t / (s + t) if s * t > 0 else 0.0 for s, t in pairwise(secants)]
+    return [0.0, *inner, 0.0]
 
 
 def _direction(start: Point, end: Point) -> Point:

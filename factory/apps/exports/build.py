@@ -22,6 +22,7 @@ from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, s
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
 from factory.apps.exports.floor_sheet import write_svg
+from factory.apps.exports.goals import goals
 from factory.apps.exports.pnml import write_pnml
 from factory.apps.exports.program_text import write_program
 from factory.apps.exports.stock import model_files, written
@@ -61,6 +62,7 @@ DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
     "dot": lambda what: write_dot(what.project.layout.factory.net),
     "pnml": lambda what: write_pnml(what.project.layout.factory.net),
     "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "goals.json": lambda what: _json(goals(what.model)),
     "ways.json": lambda what: _json(ways(what.model)),
 }
 """Everything about a factory but the model: by the endings of their files, what writes the text."""
@@ -94,8 +96,14 @@ class BuildRequest:
 
 @dataclass(frozen=True)
 class Built:
-    """A build's model, its clearance certificate and its files, including those that existed
-    before; `mjcf`: the file of the model."""
+    """A build.
+
+    Attributes:
+        model: the MJCF model.
+        clearance: the clearance certificate.
+        mjcf: the file of the model; None where it was not written.
+        files: its files, including those that existed before.
+    """
 
     model: Model
     clearance: Certificate

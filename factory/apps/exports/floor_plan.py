@@ -24,10 +24,18 @@ JUNCTION = 0.008
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A shape in plan. `style`: its kind; `points`: two opposite corners of a box, the middle of a
-    circle of `radius` [m], the ends of a line, or the corners of an area; `name`: of a part, and
-    of its feeder, its label; of a guidepath and a carriage that of the robot; `paint`: the colour
-    of a part (`#rrggbb`)."""
+    """A shape in plan.
+
+    Attributes:
+        style: its kind.
+        points: two opposite corners of a box, the middle of a circle, the ends of a line, or
+            the corners of an area [m].
+        radius: of a circle [m].
+        box: whether it is a box.
+        name: of a part, and of its feeder, its label; of a guidepath and a carriage that of the
+            robot.
+        paint: colour of a part, `#rrggbb`.
+    """
 
     style: str
     points: tuple[Point2, ...]

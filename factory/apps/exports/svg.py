@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, marked
-from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, shortened
+from factory.apps.drawing.canvas import LETTER, Canvas, Point, hexadecimal, shortened
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import COLOURS, LEFT, SHARED, apart, swimlanes
 from factory.floor.geometry.solids import colour
@@ -19,8 +19,8 @@ RADIUS, HEAD = 12.0, (8.0, 3.5)
 ARC = "arc", "tip"
 """The styles of an arc and its head."""
 
-EDGE = 20.0
-"""Distance between arcs where they cross the edges."""
+EDGE, EDGE_NAME = 20.0, 60.0
+"""Distance between arcs where they cross the edges, and room for the names of their places."""
 
 ALONG = 60.0
 """Length above which a bar crosses several lanes."""
@@ -28,13 +28,15 @@ ALONG = 60.0
 
 class NetDrawing:
     """Draws a net on its `canvas`. `styles`: style class for the elements of some gears; `every`:
-    whether each place gets a token, for a page that shows and hides them."""
+    whether each place gets a token, for a page that shows and hides them. `choices`: the places
+    that lead to several transitions."""
 
     def __init__(
         self, net: MarkedNet, styles: Callable[[Sequence[int]], str], every: bool = False
     ) -> None:
         self.net, self.styles, self.every = net, styles, every
         self.at, self.owners, self.canvas = swimlanes(net), net.owners, Canvas()
+        self.choices = [n for n, p in enumerate(net.net.places) if len(p.right) > 1]
         self.page = (0.0, self.at.width, 0.0, self.at.height)
         for layer in (self._arcs, self._lanes, self._transitions, self._crossings, self._places):
             with self.canvas.group():
@@ -46,19 +48,27 @@ class NetDrawing:
         edges = self._edges()
         for place, shape in enumerate(self.net.net.places):
             x, y = self.at.places[place]
-            style = f"arcs {self.styles(self.owners[place])}"
-            with self.canvas.group(style, data_arc=place):
+            with self.canvas.group(f"arcs {self._style(place)}", data_arc=place):
                 edge = edges.get(place, y)
+                right = self.at.width - (EDGE_NAME if place in edges else 14)
                 for event in shape.left:
                     back = not self.at.forward(place, event)
-                    end = (self.at.width - 14, edge) if back else (x - RADIUS, y)
+                    end = (right, edge) if back else (x - RADIUS, y)
                     self._arc(place, self.at.touch(event, y), end)
                 if any(not self.at.forward(place, event) for event in shape.left):
                     self._arc(place, (LEFT - 24, edge), (x - RADIUS, y))
                 if place in edges:
-                    self.canvas.text((self.at.width - 26, edge - 7), shape.name, 9.5, "grey", "end")
+                    self.canvas.text((right + 6, edge), shape.name, 10.5, "edge")
                 for event in shape.right:
                     self._arc(place, (x + RADIUS, y), self.at.touch(event, y), 3.0)
+
+    def _style(self, place: int) -> str:
+        """The style of a place and its arcs: that of its gears, and where there is a choice among
+        what it leads to a colour of its own."""
+        style = self.styles(self.owners[place])
+        if place not in self.choices:
+            return style
+        return f"{style} choice{self.choices.index(place) % len(COLOURS)}"
 
     def _edges(self) -> dict[int, float]:
         """The y at which arcs to places without a robot cross the edges, all different."""
@@ -71,10 +81,10 @@ class NetDrawing:
 
     def _arc(self, place: int, start: Point, end: Point, off: float = 0.0) -> None:
         """Draw an arc of a place, straight along the lane of its robot, or around other nodes."""
-        points = [start, end] if self.owners[place] else self.at.way(start, end)
-        if points[2:]:
-            self.canvas.line("arc", *points[:-1])
-        self.canvas.arrow(points[-2], end, ARC, HEAD, off)
+        if self.owners[place]:
+            self.canvas.arrow(start, end, ARC, HEAD, off)
+        else:
+            self.canvas.curved_arrow(self.at.corners(start, end), ARC, HEAD, off)
 
     def _lanes(self) -> None:
         """Draw the names of robots, and the lanes of those that an operation has besides its
@@ -95,7 +105,8 @@ class NetDrawing:
             x, (low, high) = self.at.x[event], self.at.spans[event]
             with self.canvas.group("transition", data_transition=event):
                 self.canvas.rectangle((x - 3, x + 3, low, high), "bar", 2.0)
-                self.canvas.label((x, low - 7), transition.name, 9.5)
+                about = (x, low - 7), (x, high + 8), (x, low - 17), (x, high + 18)
+                self.canvas.place_at(about, transition.name, 9.5)
 
     def _crossings(self) -> None:
         """Draw a dot where a robot passes a long bar."""
@@ -110,7 +121,7 @@ class NetDrawing:
     def _places(self) -> None:
         for index, place in enumerate(self.net.net.places):
             at, tokens = self.at.places[index], self.net.tokens[index]
-            with self.canvas.group(f"place {self.styles(self.owners[index])}", data_place=index):
+            with self.canvas.group(f"place {self._style(index)}", data_place=index):
                 self.canvas.circle(at, RADIUS, "ring", title=place.name)
                 if self.every:
                     self.canvas.circle(at, 6.0, "token", data_token=index)
@@ -119,7 +130,10 @@ class NetDrawing:
                 elif tokens:
                     self.canvas.text(at, str(tokens), 12.0, "h", "middle")
                 words = f"{place.mode} {place.label}".strip() or place.name
-                self.canvas.label((at[0], at[1] + RADIUS + 10), words, 10.5)
+                about = [
+                    (at[0], at[1] + side * (RADIUS + off)) for off in (10, 20) for side in (1, -1)
+                ]
+                self.canvas.place_at(about, words, 10.5)
 
 
 FORMAT, TAKES, OF = "svg", "net", "net or tree"
@@ -132,7 +146,10 @@ NET_STYLE = """
 .ring { stroke: currentColor; stroke-width: 1.8; fill: #ffffff; }
 .shared .ring { stroke-width: 2.6; fill: #fdecd2; } .token { fill: #1f2933; }
 .place text { fill: #3e4c59; } .transition text { fill: #7b8794; } .kind { fill: #52606d; }
+.edge { fill: currentColor; }
 """ + "".join(f".gear{n} {{ color: {paint}; }}\n" for n, paint in enumerate(COLOURS))
+
+CHOICES = "".join(f".choice{n} {{ color: {paint}; }}\n" for n, paint in enumerate(COLOURS))
 
 
 def export(subject: Subject) -> str:
@@ -146,11 +163,15 @@ def draw_net(net: MarkedNet, title: str) -> str:
     """The net as a drawing."""
     drawing, robots = NetDrawing(net, _style), len(net.gears)
     places, transitions = len(net.net.places), len(net.net.transitions)
-    counts = f"{robots} robots, {places} places, {transitions} transitions"
+    counts = f"{places} places, {transitions} transitions"
+    counts = f"{robots} robots, {counts}" if robots else counts
     ends = "; the left and the right edge are one" if transitions else ""
-    drawing.canvas.text((14.0, 20.0), f"{title}: {counts}{ends}", 12.0, "grey")
-    style = f"{NET_STYLE}.shared {{ color: {SHARED}; }}\n"
-    return drawing.canvas.document(f"{title}: net", drawing.page, style)
+    heading = f"{title}: {counts}{ends}"
+    drawing.canvas.text((14.0, 20.0), heading, 12.0, "grey")
+    left, right, top, bottom = drawing.page
+    page = left, max(right, 28 + 12 * LETTER * len(heading)), top, bottom
+    style = f"{NET_STYLE}.shared {{ color: {SHARED}; }}\n{CHOICES if drawing.choices else ''}"
+    return drawing.canvas.document(f"{title}: net", page, style)
 
 
 def _style(owners: Sequence[int]) -> str:

@@ -1,10 +1,13 @@
 """Layout of the drawing of a net: a lane for each robot's gear, time from left to right.
 
 A transition is a bar across the lanes of its robots; a place lies in the lane of its robot, that of
-an operation in the middle one of its robots. Where there are no robots, as in a net with choice, a
-transition is a short bar between its places. The columns are the lengths of the longest paths
+an operation in the middle one of its robots. Where there are no robots a transition is a short bar.
+The columns are the lengths of the longest paths
 without tokens, so that every arc but those that close a circle goes to the right. The lanes of
 robots that meet early are neighbours. Linear in the net, but for sorting.
+
+A net without robots, which may have choice, is laid out from left to right: a transition lies
+beside the places that lead to it alone, and a place beside the transitions that mark it.
 """
 
 from __future__ import annotations
@@ -55,8 +58,11 @@ class Swimlanes:
         return self.x[event], (low + high) / 2
 
     def touch(self, event: int, y: float) -> Point:
-        """Point of a transition's bar nearest to a height."""
+        """Where an arc from a height meets a transition's bar: in the middle of one that is not
+        longer than a lane asks for, else at that height."""
         low, high = self.spans[event]
+        if high - low <= 2 * OVERHANG + 1e-9:
+            return self.middle(event)
         return self.x[event], min(max(y, low), high)
 
     def way(self, start: Point, end: Point) -> list[Point]:
@@ -72,6 +78,12 @@ class Swimlanes:
             y = points[-1][1] + share * (end[1] - points[-1][1])
             points.append((x, _free(y, columns[x])))
         return [*points, end]
+
+    def corners(self, start: Point, end: Point) -> list[Point]:
+        """The points of a way without those between which it is level."""
+        points = self.way(start, end)
+        inner = zip(points, points[1:], points[2:], strict=False)
+        return [start, *(b for a, b, c in inner if not a[1] == b[1] == c[1]), end]
 
     def forward(self, place: int, before: int) -> bool:
         """Whether a place is to the right of a transition that marks it."""
@@ -98,8 +110,12 @@ def swimlanes(net: MarkedNet) -> Swimlanes:
     row = {gear: number for number, gear in enumerate(order)}
     lanes = tuple(TOP + LANE * row[gear] for gear in range(len(net.gears)))
     across = [_across(net, place, x) for place in range(len(owners))]
-    down = _heights(owners, across, lanes, _rows(net))
-    spans = _spans(net, down, lanes, x)
+    if net.gears:
+        down = _heights(owners, across, lanes, _rows(net))
+        spans = _spans(net, down, lanes, x)
+    else:
+        down, middles = _swept(net, across, x)
+        spans = [(middle - OVERHANG, middle + OVERHANG) for middle in middles]
     width = max([*x, *across], default=LEFT) + PITCH
     height = max([*down, *lanes, *(low for low, _ in spans)], default=TOP) + TOP
     places = tuple(zip(across, down, strict=True))
@@ -166,6 +182,34 @@ def _heights(
         taken[across[place]] = number + 1
         heights[place] = below + LANE * number
     return heights
+
+
+def _swept(
+    net: MarkedNet, across: Sequence[float], x: Sequence[float]
+) -> tuple[list[float], list[float]]:
+    """The y of each place and of each transition of a net without gears, column by column."""
+    down, middles = [TOP] * len(across), [TOP] * len(x)
+    for column in sorted({*across, *x}):
+        wanted, row = dict[int, float](), TOP
+        for place in (place for place in _rows(net) if across[place] == column):
+            before = [middles[e] for e in net.net.places[place].left if x[e] < column]
+            wanted[place] = sum(before) / len(before) if before else row
+            row += 0.0 if before else LANE
+        for place, y in apart(wanted, LANE).items():
+            down[place] = y
+        events = (event for event in range(len(x)) if x[event] == column)
+        for event, y in apart({e: _beside(net, e, down) for e in events}, LANE).items():
+            middles[event] = y
+    return down, middles
+
+
+def _beside(net: MarkedNet, event: int, down: Sequence[float]) -> float:
+    """The mean y of the places that lead to a transition, of those that lead to it alone if there
+    are any."""
+    before = net.net.preset[event]
+    alone = [place for place in before if len(net.net.places[place].right) == 1]
+    heights = [down[place] for place in alone or before]
+    return sum(heights) / len(heights) if heights else TOP
 
 
 def _rows(net: MarkedNet) -> list[int]:

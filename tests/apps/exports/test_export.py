@@ -344,6 +344,47 @@ def test_without_gears_no_bar_lies_on_another_and_no_arc_goes_through_one(seed: 
     ElementTree.fromstring(draw_net(net, "x"))
 
 
+def curve(way: str) -> Iterator[tuple[float, float]]:
+    """Points of a path of cubics."""
+    start, *cubics = way.removeprefix("M").split("C")
+    at = tuple(map(float, start.split()))
+    for cubic in cubics:
+        numbers = tuple(map(float, cubic.split()))
+        corners = np.array([at, numbers[:2], numbers[2:4], numbers[4:]])
+        for t in np.linspace(0, 1, 24):
+            share = np.array([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t * t * (1 - t), t**3])
+            x, y = share @ corners
+            yield float(x), float(y)
+        at = numbers[4:]
+
+
+def test_a_choice_can_be_read_off_a_drawing() -> None:
+    """The arcs of each fork have a colour of their own and end at the middles of bars; no label is
+    crossed by an arc."""
+    net = net_from(PHILOSOPHERS)
+    root = ElementTree.fromstring(draw_net(net, "x"))
+    groups = {int(g.get("data-arc", -1)): g for g in root.iter() if g.get("data-arc")}
+    styles = [groups[n].get("class", "").split() for n in range(len(net.net.places))]
+    chosen = [style[-1] for style in styles if style[-1].startswith("choice")]
+    assert [style[-1] in chosen for style in styles] == [True, True] + [False] * 6
+    assert len({*chosen}) == 2
+    at = swimlanes(net)
+    for place, shape in enumerate(net.net.places):
+        ends = [
+            list(curve(path.get("d", "")))[-1] for path in groups[place].iter() if path.get("d")
+        ]
+        for event in shape.right:
+            x, y = at.middle(event)
+            assert any(abs(x - a - 11) < 0.2 and abs(y - b) < 0.2 for a, b in ends)
+    arcs = [
+        p for group in groups.values() for e in group.iter() for p in curve(e.get("d") or "M0 0")
+    ]
+    for text in (e for e in root.iter() if e.tag.endswith("text") and e.get("text-anchor")):
+        size, x = float(text.get("font-size", 0)), float(text.get("x", 0))
+        y, half = float(text.get("y", 0)) - 0.35 * size, 0.3 * size * len(text.text or "")
+        assert not any(abs(a - x) < half and abs(b - y) < 0.4 * size for a, b in arcs), text.text
+
+
 @given(factories(20))
 @settings(max_examples=40)
 def test_trees_are_drawn(made_factory: Factory) -> None:

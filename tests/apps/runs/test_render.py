@@ -28,17 +28,18 @@ from factory.engine.record.state import State
 from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film import Film, Picture, Still, check_output
-from factory.film.action import Snapshot
+from factory.film import Film, Picture, Still, check_output, finale
+from factory.film.action import Action, Snapshot
 from factory.film.caption import Caption
 from factory.film.finale import LASTS
 from factory.film.painter import Painter, Renderer
-from factory.film.picture import from_above, overview
+from factory.film.picture import from_above
 from factory.film.reel import HOLD
 from factory.film.shot import Shot
+from factory.film.vantage import overview
 from factory.film.video import ENCODERS, VideoFile
 from factory.floor.geometry.meshes import Mesh
-from factory.floor.geometry.sight import Framing, fit, towards
+from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.errors import InputError, MissingError
@@ -127,8 +128,33 @@ def test_then_it_shows_the_product_alone_and_from_more_than_one_side(taken) -> N
     def coloured(picture: np.ndarray) -> float:
         return float((np.ptp(picture.astype(int), axis=2) > 60).mean())
 
-    assert min(coloured(one), coloured(other)) > 3 * coloured(before)
+    def dark(picture: np.ndarray) -> float:
+        """The share of machines, which have graphite glass, below the title."""
+        return float((picture[SIZE[1] // 3 :].max(axis=2) < 60).mean())
+
+    assert min(coloured(one), coloured(other)) > max(0.04, 2 * coloured(before))
+    assert dark(before) > 0.02 and max(dark(one), dark(other)) < 0.002
     assert (np.abs(one.astype(int) - other).max(axis=2) > 40).mean() > 0.02
+
+
+@needs_gl
+def test_the_end_says_units_parts_and_contacts(
+    taken, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Those of the run, in its film as in that of its log."""
+    said = list[str]()
+    monkeypatch.setattr(finale, "draw_title", lambda *words: said.append(words[2]))
+    path = taken[0] / "run.log"
+    render_log(read_log(path), Shot(tmp_path / "again.mp4", SMALL, FPS))
+    assert set(said) == {"1 of 1 unit, 3 parts each, 0 unintended contacts"}
+    said.clear()
+    log = read_log(path)
+    figures = {**(log.figures or {}), "unintended_contacts": 2}
+    render_log(replace(log, figures=figures), Shot(tmp_path / "touched.mp4", SMALL, FPS))
+    assert {words.rpartition(", ")[2] for words in said} == {"2 unintended contacts"}
+    said.clear()
+    render_log(replace(log, figures=None), Shot(tmp_path / "unknown.mp4", SMALL, FPS))
+    assert set(said) == {"1 of 1 unit, 3 parts each"}
 
 
 @needs_gl
@@ -326,6 +352,10 @@ def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> No
 @pytest.mark.parametrize("camera", ["overview", "top"])
 def test_the_factory_fills_pictures_of_any_shape(layout, tmp_path: Path, size, camera) -> None:
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
+    m, d = simulation.physical.m, simulation.world.d
+    for joint in (m.joint(n) for n in range(m.njnt)):
+        if joint.name.endswith("/slider"):  # rods are in the frame where they are highest
+            d.qpos[joint.qposadr] = joint.range[1]
     Still(simulation, tmp_path / "a.png", Picture(size, camera, caption=False)).close()
     picture = iio.imread(tmp_path / "a.png").astype(int)
     floor = np.median(picture.reshape(-1, 3), axis=0)
@@ -362,7 +392,13 @@ def test_a_fitted_view_has_all_points_in_the_frame_and_one_at_its_edge(
     assert max(abs(edges[0]), abs(edges[1])) < 1e-6 or max(abs(edges[2]), abs(edges[3])) < 1e-6
 
 
-@pytest.mark.parametrize("look", [overview, from_above])
+def over(points: np.ndarray, framing: Framing) -> View:
+    """The overview of points with nothing in front of them."""
+    nothing = np.empty((0, 8, 3))
+    return overview(Action(points[None], nothing, nothing, nothing), framing)
+
+
+@pytest.mark.parametrize("look", [over, from_above])
 def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(look) -> None:
     long = np.array([(x, y, z) for x in (-3, 3) for y in (-0.5, 0.5) for z in (0, 0.2)], float)
     upright = look(long, Framing(9 / 16))

@@ -4,6 +4,7 @@ in the picture's own colours."""
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import imageio.v3 as iio
 import numpy as np
@@ -20,7 +21,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.film import Film, Picture, Still, camera_named, panels_named
 from factory.film.action import Snapshot
-from factory.film.camerawork import Moment
+from factory.film.camerawork import Moment, Panels
 from factory.film.caption import FADES, SHOWN, draw_title, strength
 from factory.film.following import Followed
 from factory.film.gantt_panel import GanttPanel
@@ -232,6 +233,39 @@ def test_no_row_is_empty_and_rows_fill_the_panel(many: Log, tall: float) -> None
             assert any(left >= panel.sheet.gutter - 1 and right <= 564 for left, right in spans)
         last = panel.sheet.height(rows.shown[-1]) + panel.sheet.pitch / 2
         assert panel.sheet.pitch == TALLEST or last > panel.sheet.size[1] - FOOT - 2 * BOTTOM
+
+
+def test_panels_are_legible_and_use_their_width(many: Log) -> None:
+    """Beside each other at 960 pixels, with two panels and with one."""
+    history, size = told(many), (960, 540)
+    m = SimpleNamespace(joint=lambda _: SimpleNamespace(qposadr=[0]))
+    for names in (("net", "gantt"), ("net",)):
+        panels = Panels(m, size, shared(size, names)[1], history)
+        net = panels.shown[0][1]
+        assert isinstance(net, NetPanel)
+        for time in np.arange(0.0, many.time[-1], 1.0):
+            panels.rows.advance(float(time), 0.0)
+            sheet = net.rings.sheet
+            assert min(sheet.small, sheet.name_points) >= 10 and sheet.pitch > 13
+            assert net.rings.pitch > 25
+            ends = [net.rings.ends(row.robot) for row in panels.rows.shown]
+            left, right = min(start for start, _ in ends), max(end for _, end in ends)
+            assert right - left > 0.65 * sheet.size[0]
+
+
+def test_what_a_robot_does_is_said_beside_its_ring(paper: Log) -> None:
+    """Where its operation has no name of its own: the welding robot's in the paper's example."""
+    history = told(paper)
+    panel = net_panel(history)
+    spell = next(s for s in history.spells[3] if s.operation)
+    time = (spell.start + spell.end) / 2
+    y = int(panel.sheet.height(panel.rows.shown[3]))
+    left, right = (int(end) for end in panel.rings.ends(3))
+    beside = slice(left - 50, left - 4), slice(right + 4, right + 50)
+    before = panel.draw(spell.start - 0.05, paper.qpos[0][:6], 0.0)[y - 6 : y + 6]
+    during = panel.draw(time, paper.qpos[0][:6], 0.0)[y - 6 : y + 6]
+    changed = np.abs(during.astype(int) - before).max(axis=2) > 60
+    assert max(changed[:, side].mean() for side in beside) > 0.05
 
 
 def test_rows_come_and_go_calmly(balanced: Log) -> None:
@@ -522,7 +556,7 @@ def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> 
 
 
 def test_a_wrong_camera_lists_the_right_ones() -> None:
-    every = "valid cameras: overview, orbit, top, product, part:LABEL, handover:LABEL"
+    every = "valid cameras: tour, overview, orbit, top, product, part:LABEL, handover:LABEL"
     for name, hint in (("orbt", f"did you mean 'orbit'? {every}"), ("zzz", every)):
         with pytest.raises(InputError) as caught:
             camera_named(name)

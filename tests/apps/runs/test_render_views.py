@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,18 +12,24 @@ from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica
+from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film.action import FAINT, Action, Fading, action_of, placed, shape_of
-from factory.film.camerawork import Take
+from factory.film.action import FAINT, SIGNS, Action, Fading, action_of, placed, shape_of
+from factory.film.camerawork import Camerawork, Take
 from factory.film.following import Viewpoint
-from factory.film.junction import handover_view
-from factory.film.picture import Picture, orbit, overview
+from factory.film.history import History
+from factory.film.junction import ZOOM, handover_of
+from factory.film.picture import Picture, orbit
 from factory.film.shot import moment_of, recorded_take
+from factory.film.spotlight import DIM, DIMMER, Spotlight
+from factory.film.tour import BETWEEN, OPENING, STAYS, Tour
+from factory.film.vantage import hidden, overview
 from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.engine import mujoco
 from factory.theory.problem.pag import NOPART
 from tests.examples import without_hands
+from tests.opengl import needs_gl
 from tests.pag_texts import laid_out
 
 WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)
@@ -61,7 +69,8 @@ def seen(view: View, points: np.ndarray) -> np.ndarray:
 
 
 def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
-    """Corners of what moves in a state: robots, and parts that are in sight and not in the shed."""
+    """Corners of what moves in a state: robots, rods of feeders, and parts that are in sight and
+    not in the shed."""
     m, d = replica.m, replica.d
     replica.place(row)
     wall = m.geom("outfeed/wall1")
@@ -70,7 +79,8 @@ def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
     for g in range(m.ngeom):
         body = m.body(int(m.body_rootid[m.geom_bodyid[g]]))
         inside = body.name.startswith("part/") and d.xpos[body.id, 2] > 0
-        if (inside and d.xpos[body.id, 0] < mouth) or names.kind(body.name) == "robot":
+        rod = m.geom(g).name.endswith("/rod")
+        if (inside and d.xpos[body.id, 0] < mouth) or names.kind(body.name) == "robot" or rod:
             found.append(placed(m, d, g))
     return np.concatenate(found)
 
@@ -88,9 +98,23 @@ def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera,
         assert np.abs(seen(view, moving(replica, moment.shown.qpos))).max() < 1
 
 
+def test_an_overview_is_from_where_the_shed_is_not_in_front(action) -> None:
+    """A shed before the south side is looked past, and with none there it is the south side."""
+    usual = fit(action.points, towards(-62.0, 40.0), WIDE)
+    ahead = usual.axes[2] * (1.0, 1.0, 0.0)
+    low, high = action.points.min(axis=0), action.points.max(axis=0)
+    wall = (low + high) / 2 - 0.6 * np.linalg.norm(high - low) * ahead
+    shed = (wall + 0.25 * SIGNS * (high - low))[None]
+    free = replace(action, shed=shed[:0], housings=shed[:0])
+    blocked = replace(free, shed=shed)
+    assert hidden(blocked, usual) > 0.2
+    assert hidden(blocked, overview(blocked, WIDE)) < 0.05
+    assert hidden(free, usual) == 0
+
+
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
 def test_the_frame_is_filled_one_way(replica, action, framing) -> None:
-    view = overview(action.points, framing)
+    view = overview(action, framing)
     filled = np.ptp(seen(view, action.points), axis=0) / 2
     assert filled.max() > 0.85
 
@@ -143,13 +167,13 @@ def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, came
     assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
 
 
-# --- fading ---------------------------------------------------------------------------------------
+# --- hand-overs -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
 def test_each_hand_over_is_seen_from_near_by(log, take, framing) -> None:
     """When the operation that takes a label ends, its parts are where the camera looks, and in the
-    frame with the pads of the robots; they fill it."""
+    frame with the pads of the robots, where the parts are not small beside these; they fill it."""
     factory, m = take.subject.factory, take.m
     for node in factory.pag.nodes:
         viewpoint = Viewpoint(Replica(m), f"handover:{node.label}", framing, take.subject)
@@ -162,9 +186,11 @@ def test_each_hand_over_is_seen_from_near_by(log, take, framing) -> None:
         there = np.concatenate([placed(m, replica.d, g) for g in _geoms_of(m, factory, node.label)])
         assert np.abs(there.min(axis=0) - viewpoint.watched[0].min(axis=0)).max() < 2e-3
         assert np.abs(there.max(axis=0) - viewpoint.watched[0].max(axis=0)).max() < 2e-3
-        at = seen(view, np.concatenate([there, *viewpoint.watched]))
-        assert np.abs(at).max() < 1.0
-        assert np.ptp(at, axis=0).max() > 0.7, node.label
+        label, hands = seen(view, there), seen(view, np.concatenate(viewpoint.watched))
+        large = np.ptp(label, axis=0).max() / 2 > 1 / (1.5 * ZOOM)
+        assert np.abs(label).max() < 1.0
+        assert np.abs(hands).max() < 1.0 or large, node.label
+        assert np.ptp([*label, *hands], axis=0).max() > 0.7 or large, node.label
         assert len(viewpoint.watched) > 1, "no pad is seen"
         share = shown_share(replica, _geoms_of(m, factory, node.label), view.position)
         assert share > 0.3, f"{node.label}: {share:.2f} is seen"
@@ -197,7 +223,7 @@ def test_a_hand_over_is_seen_from_aside(take) -> None:
     for label in ("part1", "sub1"):
         if label not in take.subject.factory.by_label:
             return
-        _, view = handover_view(replica, take.subject, label, WIDE)
+        view = handover_of(replica, take.subject, label, WIDE).view
         assert (replica.d.qpos == before).all()
         ahead = view.axes[2][:2] / np.linalg.norm(view.axes[2][:2])
         taking = take.subject.factory.by_label["sub1" if label == "part1" else "sub2"]
@@ -206,6 +232,92 @@ def test_a_hand_over_is_seen_from_aside(take) -> None:
             body = replica.m.body(names.carriage(take.subject.factory.robots[robot].name)).id
             along = replica.d.xaxis[replica.m.body_jntadr[body]][:2]
             assert abs(ahead @ along) < 0.9
+
+
+def test_a_small_part_is_seen_large() -> None:
+    """The frame of its hand-over is that of a pin, not of the plate it is put into."""
+    layout = laid_out(
+        "root = all; all = insert(plate, pin);"
+        "plate = atomic(box = (0.16, 0.12, 0.02));"
+        "pin = atomic(box = (0.008, 0.008, 0.012), pos = (0.05, 0.03, 0.016))"
+    )
+    simulation = Simulation(layout, RunRequest("mujoco"))
+    m, subject = simulation.physical.m, MonitorSubject.of_run(simulation)
+    near = handover_of(Replica(m), subject, "pin", WIDE)
+    at = seen(near.view, near.watched[0])
+    assert np.abs(at).max() < 0.5 and np.ptp(at[:, 1]) / 2 > 0.15
+    assert near.view.range[0] < 0.2 * near.view.distance  # nothing near is cut
+
+
+def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
+    replica, factory = Replica(take.m), take.subject.factory
+    m, before = replica.m, replica.m.geom_rgba.copy()
+    spotlight = Spotlight(replica)
+    taking = next(o for o in factory.making if len(o.inputs) > 1)
+    near = handover_of(replica, take.subject, taking.inputs[-1], WIDE)
+    assert near.robots == {factory.robots[r].name for r in taking.robots}
+    row = log.row_at(next(t for t, name in log.events if name == f"{taking.label}_s")) - 1
+    shown = moment_of(log, row).shown
+    spotlight.aim(near.robots, shown)
+    grips = [
+        (m.equality(int(e)).name.split("/")[1], int(body))
+        for e, body in zip(shown.active, shown.body2, strict=True)
+        if m.equality(int(e)).name.startswith("grip/")
+    ]
+    assert any(robot in near.robots for robot, _ in grips)
+    for g in range(m.ngeom):
+        body = int(m.body_rootid[m.geom_bodyid[g]])
+        name, alpha = m.body(body).name, float(m.geom_rgba[g, 3])
+        holders = {robot for robot, held in grips if held == body}
+        if names.kind(name) == "robot":
+            assert (alpha < DIM + 0.01) == (name.partition("/")[0] not in near.robots)
+        elif holders:
+            assert (alpha < DIMMER + 0.01) == holders.isdisjoint(near.robots)
+        else:
+            assert (m.geom_rgba[g] == before[g]).all()
+    spotlight.aim(None, shown)
+    assert (m.geom_rgba == before).all()
+
+
+# --- a tour ---------------------------------------------------------------------------------------
+
+
+def test_a_tour_cuts_at_events(log, take) -> None:
+    """From the overview to a hand-over as its operation starts, back a moment after its end, and
+    in the end to the delivery of the last product."""
+    factory, history = take.subject.factory, History(take.subject)
+    history.catch_up(log.timed_entries, float("inf"))
+    tour = Tour(Replica(take.m), WIDE, history, 2)
+    cuts, last = list[tuple[float, frozenset[str] | None]](), None
+    for time in np.arange(0.0, float(log.time[-1]), 1 / 30):
+        tour.view(moment_of(log, 0).shown, 1 / 30, float(time))
+        if tour.concerned != last:
+            cuts.append((float(time), tour.concerned))
+            last = tour.concerned
+    (first, robots), (back, nobody), *_, (end, output) = cuts
+    starts = [(t, factory.by_label[name[:-2]]) for t, name in log.events if name.endswith("_s")]
+    ends = [(t, name[:-2]) for t, name in log.events if name.endswith("_e")]
+    when, taking = next((t, o) for t, o in starts if 0 < first - t <= 1 / 30 + 1e-6)
+    assert robots == {factory.robots[r].name for r in taking.robots} and len(taking.inputs) > 1
+    done = next(t for t, label in ends if label == taking.label and t > when)
+    assert nobody is None and 0 <= back - (done + STAYS) < 1 / 30 + 1e-6
+    assert first >= OPENING
+    others = [time for time, concerned in cuts[1:-1] if concerned]
+    assert all(time - back >= BETWEEN for time in others)
+    whole = [t for t, label in ends if label in factory.products][-1]
+    assert output == {factory.robots[0].name} and whole < end <= whole + STAYS + 1 / 30
+
+
+@needs_gl
+def test_a_still_of_a_tour_is_the_overview(take) -> None:
+    with Camerawork(replace(take, picture=Picture((160, 90), renderer="classic")), 2) as work:
+        assert isinstance(work.painter.viewpoint, Viewpoint)
+        assert work.painter.viewpoint.handover is None
+    with Camerawork(replace(take, picture=Picture((160, 90), renderer="classic"))) as work:
+        assert isinstance(work.painter.viewpoint, Tour)
+
+
+# --- fading ---------------------------------------------------------------------------------------
 
 
 def opacity(replica: Replica, feeder: str) -> float:
@@ -236,7 +348,7 @@ def test_what_fades_keeps_its_colour_and_robots_never_fade(take, action) -> None
     replica = Replica(take.m)
     before = replica.m.geom_rgba.copy()
     fading = Fading(replica)
-    fading.fade(overview(action.points, WIDE), action.robots)
+    fading.fade(overview(action, WIDE), action.robots)
     changed = np.flatnonzero((replica.m.geom_rgba != before).any(axis=1))
     faded = [g for g in changed if replica.m.geom_rgba[g, 3] < 1]
     assert faded

@@ -55,7 +55,7 @@ def fidelity(
     output: Path | None,
     max_time: float | None,
 ) -> int:
-    """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
+    """Compare MuJoCo with the ideal world over the same seeds."""
     from factory.apps.fidelity import measure
     from factory.apps.sweep.pool import cores
     from factory.support.files import write_text

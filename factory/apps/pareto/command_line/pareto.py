@@ -48,7 +48,7 @@ PAGE_NAME = "pareto.html"
     "--seconds",
     "limit",
     type=SECONDS,
-    help="Time limit of the search [s]; a search that it cuts short says so.",
+    help="Time limit of the search [s]; a message says if it was reached.",
 )
 @click.option(
     "--layouts/--no-layouts",
@@ -65,7 +65,9 @@ def pareto(
     output: Path | None,
     layouts: bool,
 ) -> int:
-    """Find the Pareto-optimal factories for FILE.pag in robots, cycle time and floor area.
+    """Find the Pareto-optimal factories for FILE.pag.
+
+    The objectives are the numbers of robots, the cycle time and the floor area.
 
     Ctrl-C ends the search; the points found until then are printed and written. The exit status
     is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""

@@ -45,11 +45,11 @@ def report(
     output: Path,
     units: int | None,
 ) -> int:
-    """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
+    """Write one HTML page about a run.
 
-    The page is always written. The exit status is 1 if the run failed, or was cut off before its
-    units were made; --lenient ignores what its bodies do, and with --strict a run whose success is
-    qualified fails."""
+    Runs FILE.pag, or takes the run in a LOG of `run --log`. The page is always written. The exit
+    status is 1 if the run failed, or was cut off before its units were made; --lenient ignores what
+    its bodies do, and with --strict a run whose success is qualified fails."""
     from factory.api import steady_from
     from factory.apps.log import is_log
     from factory.apps.report.page import report_on

@@ -75,10 +75,10 @@ def sweep(
     vary: tuple[str, ...],
     summary: bool,
 ) -> int:
-    """Run FILE.pag for every combination of the varied values, and keep the results in SQLite.
+    """Run FILE.pag for all combinations of varied values.
 
-    Called again, the sweep continues where it stopped. `factory sweep RESULTS --summary`
-    summarises the results so far, also during a sweep.
+    The results are kept in SQLite. Called again, the sweep continues where it stopped. `factory
+    sweep RESULTS --summary` summarises the results so far, also during a sweep.
     """
     document: dict[str, Any] = {}
     failed = False
