@@ -56,7 +56,7 @@ below it."""
 
 ENTRANCES = (
     *("commands", "apps.*.command_line"),
-    *("stages", "studies", "notebook", "__init__", "__main__"),
+    *("stages", "studies", "searches", "notebook", "__init__", "__main__"),
 )
 """Above the core and the apps, from the lowest up: the command line, the commands that apps give,
 the functions that a user calls, how values are shown."""
