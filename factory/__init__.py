@@ -20,7 +20,6 @@ takes a product at any stage: `factory.run("examples/paper.pag")` does it all.
 import warnings as _warnings
 
 import factory.notebook as _notebook  # noqa: F401 (puts in the pictures)
-from factory.searches import pareto, plan, revise
 from factory.stages import (
     build,
     compile,
@@ -31,12 +30,13 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import analyze, env, fidelity, render, report, sweep
+from factory.studies import analyze, fidelity, pareto, plan, revise, sweep
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
 from factory.support.settings import Settings
 from factory.support.version import __version__ as __version__
+from factory.views import env, render, report
 
 __all__ = [
     "Diagnostic",

@@ -1,115 +1,27 @@
-"""The public functions that show a factory and study it."""
+"""The public functions that study a factory, revise it, and plan the assembly of a product."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from factory.stages import AnyPath, Stage, maybe, named, path_of, project_of
+from factory.stages import AnyPath, Stage, maybe, path_of, project_of
 from factory.support.guard import guarding, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
-    import gymnasium
-
     from factory.apps.analyze import Analysis
     from factory.apps.fidelity.record import Fidelity
-    from factory.apps.report.page import RunReport
-    from factory.apps.runs.executing import Tell
-    from factory.apps.runs.pictures import Rendered
+    from factory.apps.pareto import ParetoFront
+    from factory.apps.planning.plan import Planned
+    from factory.apps.revise.revision import Revision
     from factory.apps.sweep.summary import Summary
     from factory.engine.simulation.run import Run
-    from factory.film.picture import PanelName, RendererName
     from factory.support.bounds import WorldName
-
-
-def _logged(product: Stage) -> Path | None:
-    """The path of the log of a run; None where a product is given."""
-    from factory.apps.log import is_log
-
-    path = named(product)
-    return path if path is not None and is_log(path) else None
-
-
-@guarding
-def render(
-    product: Stage,
-    output: AnyPath,
-    *,
-    size: tuple[int, int] = (1280, 720),
-    camera: str = "tour",
-    panels: Sequence[PanelName] = (),
-    title: str = "",
-    fps: float = 30,
-    at: float | Literal["end"] = "end",
-    poster: AnyPath | None = None,
-    renderer: RendererName = "auto",
-    units: int = 1,
-    seed: int = 0,
-    jitter: float = 0.0,
-    wip: int | None = None,
-    max_time: float | None = None,
-    settings: Settings | None = None,
-    progress: Tell | None = None,
-) -> Rendered:
-    """Film a run (.mp4), or take a still of it (.png) at a time [s] or at its end; of a log, of the
-    run that is in it.
-
-    `size` (width, height) [px]; `camera`: tour, overview, orbit, top, product, part:LABEL or
-    handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment;
-    `renderer`: classic, filament, or auto, which takes filament for stills where it works.
-    The others are those of `run`. Raises InputError, MissingError without GL, RunError.
-    """
-    from factory.apps.log import read_log
-    from factory.apps.runs.options import RunOptions
-    from factory.apps.runs.pictures import render as taken
-    from factory.film.picture import Picture
-    from factory.film.shot import Shot
-
-    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
-    picture = Picture(size, camera, panels=tuple(panels), title=title, renderer=renderer)
-    shot = Shot(path_of(output), picture, fps, at, maybe(poster))
-    will_write(shot.output, shot.poster)
-    log = _logged(product)
-    source = read_log(log) if log else project_of(product, settings)
-    return taken(source, shot, asked, progress=progress)
-
-
-@guarding
-def report(
-    product: Stage,
-    output: AnyPath | None = None,
-    *,
-    units: int | None = None,
-    seed: int = 0,
-    jitter: float = 0.0,
-    wip: int | None = None,
-    max_time: float | None = None,
-    settings: Settings | None = None,
-    progress: Tell | None = None,
-) -> RunReport:
-    """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
-    `output` where that is given. `units`: None for as many as it takes to measure a cycle time. The
-    others are those of `run`. Raises InputError, RunError."""
-    from factory.apps.report.page import report_on
-    from factory.apps.runs.options import RunOptions
-    from factory.engine.simulation.run import steady_from
-    from factory.support.bounds import check_values
-    from factory.support.files import write_text
-
-    check_values({"units": units})
-    asked = RunOptions("mujoco", 1, seed, jitter, wip, max_time=max_time)
-    will_write(maybe(output))
-    log = _logged(product)
-    source = log or project_of(product, settings)
-    if not isinstance(source, Path):
-        asked = replace(asked, units=units or steady_from(source.plain.period))
-    made = report_on(source, asked, progress=progress)
-    if output is not None:
-        write_text(path_of(output), made.text)
-    return made
+    from factory.theory.problem.pag import PAG
 
 
 def analyze(
@@ -180,12 +92,14 @@ def sweep(
     jobs: int | None = None,
     retry: bool = False,
     settings: Settings | None = None,
+    on: str | None = None,
 ) -> Summary:
     """Run a product for every combination of the varied values ({"seed": range(100)}), keep the
     results in a database (SQLite) and summarise them. Called again, it continues where it stopped.
 
-    `jobs`: processes, one per core by default; `retry`: failed runs are repeated. The others are
-    those of `run`. Raises InputError, RunError.
+    `jobs`: processes, one per core by default; `on`: address of a Dask scheduler, whose workers are
+    taken instead; `retry`: failed runs are repeated. The others are those of `run`. Raises
+    InputError, RunError.
     """
     from factory.apps.sweep.grid import read_axes
     from factory.apps.sweep.pool import cores
@@ -203,7 +117,7 @@ def sweep(
     will_write(kept)
     project = project_of(product, settings)
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
-    swept(recipe, axes, kept, jobs or cores(), retry)
+    swept(recipe, axes, kept, jobs or cores(), retry, on=on)
     return summarise(kept)
 
 
@@ -232,49 +146,114 @@ def fidelity(
     return measure(project.layout, *runs)
 
 
-def env(
+def pareto(
     product: Stage,
     *,
-    units: int = 4,
-    jitter: float = 0.0,
-    interval: float = 0.1,
-    max_time: float = 300.0,
-    worlds: int | None = None,
-    render_mode: Literal["rgb_array"] | None = None,
+    validate: int = 0,
+    effort: int | None = None,
+    seconds: float | None = None,
+    layouts: bool = True,
     settings: Settings | None = None,
-) -> gymnasium.Env[Any, Any] | gymnasium.vector.VectorEnv[Any, Any, Any]:
-    """The factory of a product as a Gymnasium environment, in which an agent commands the plant
-    with setpoints, grips and jobs; several `worlds` as a vector environment.
+) -> ParetoFront:
+    """The Pareto-optimal factories of a product in robots, cycle time and floor area.
 
-    An episode makes `units` products, each with a reward of 1, in steps of `interval` [s], within
-    `max_time` [s]. `factory.apps.environment.plant.FactoryEnv` says what is seen and commanded;
-    `factory.apps.environment.programs.Programs` is the baseline. Raises InputError, MissingError
-    without the extra `gym`.
+    `validate`: number of points that are run in both worlds; `effort`: number of factories to lay
+    out; `seconds`: time limit [s]; without `layouts` they are estimated. Raises InputError,
+    RunError where no factory has a layout."""
+    from factory.apps.pareto import Effort
+    from factory.apps.pareto import pareto as searched
+    from factory.apps.pareto.front import tried
+    from factory.support.bounds import check_values
+    from factory.support.errors import usage_error
 
-    >>> import factory
-    >>> plant = factory.env("examples/paper.pag", units=1)
-    >>> seen, info = plant.reset(seed=0)
-    >>> seen["position"].shape, seen["legal"].shape
-    ((6,), (6, 8))
+    if validate and not layouts:
+        raise usage_error("without layouts there is nothing to run", "leave out validate")
+    check_values({"seconds": seconds})
+    bounds = Effort(layouts, effort, inf if seconds is None else seconds)
+    front = searched(project_of(product, settings), bounds)
+    for number in front.spread(validate) if validate else ():
+        front = front.with_trial(number, tried(front.points[number].project))
+    return front
+
+
+def revise(old: Stage, new: Stage, *, pin: Literal["all", "hands", "none"] = "all") -> Revision:
+    """What stays of the factory of a product in that of its next revision, laid out so that most
+    does; a notebook shows it as a picture. `pin`: what of the old layout is kept, or less where no
+    layout has that. Raises InputError for shared robots, RunError where there is no layout."""
+    from factory.apps.revise.revision import revised
+    from factory.support.bounds import check_choice
+    from factory.theory.nets.verify import proved
+
+    check_choice("pin", pin, ("all", "hands", "none"))
+    before = project_of(old)
+    revision = revised(before, project_of(new, before.settings), pin)
+    proved(revision.new.layout.factory.net)
+    return revision
+
+
+class PlannedAssembly(NamedTuple):
+    """The assembly tree that was planned, as a PAG; the plan with its figures; the files that were
+    written, that of the PAG first."""
+
+    pag: PAG
+    planned: Planned
+    files: tuple[Path, ...]
+
+
+@guarding
+def plan(
+    source: AnyPath,
+    output: AnyPath,
+    *,
+    aim: Literal["cycle", "robots", "floor"] = "cycle",
+    seconds: float | None = None,
+    keep: Sequence[str] = (),
+    replan: bool = False,
+    allow: Sequence[str] = (),
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = None,
+    base: str = "",
+    screws: Sequence[str] | None = (),
+    hulls: bool = False,
+    unit: Literal["m", "cm", "mm", "in", "ldu"] | None = None,
+    in_place: bool = False,
+    library: AnyPath | None = None,
+    boxes: bool = False,
+    templates: Sequence[AnyPath] = (),
+) -> PlannedAssembly:
+    """The assembly tree of parts that are in their places in the finished product, written as a PAG
+    with its meshes into the folder `output`.
+
+    `source`: a folder of meshes, a file with named bodies, an LDraw model, or a PAG, of whose tree
+    the sub-trees `keep` stay, or all unless `replan`. `aim`: what to minimise; `seconds`: time to
+    search; `allow`: parts that may pass through others, or pairs `a:b`, or depths `0.5mm`; `up`:
+    the axis of the source that points up; `base`: what the others are assembled onto; `screws`:
+    parts that are screws, None where none is; `hulls`: plan with convex hulls; `unit`: of lengths;
+    `in_place`: the parts are not checked for their places; `library`: of LDraw parts, `boxes` for
+    those without a shape. Raises InputError, of code CannotAssemble for parts that interlock.
     """
-    from factory.engine.simulation.request import RunRequest
-    from factory.engine.simulation.simulation import Simulation
-    from factory.support.version import optional
+    from factory.apps.planning.outcome import refusal, write_planned
+    from factory.apps.planning.plan import CannotAssemble, PlanOptions
+    from factory.apps.planning.plan import plan as planned_for
+    from factory.apps.planning.source import SourceOptions, read_source
+    from factory.pipeline import all_templates, read
+    from factory.support.bounds import AIMS, LENGTHS, UPS, check_choice, check_values
+    from factory.support.errors import InputError
+    from factory.theory.lang.overlaps import overlaps_in
 
-    gym = optional("gymnasium", "gymnasium", "an environment", "gym")
-    from factory.apps.environment.plant import FactoryEnv
-
-    project, shown = project_of(product, settings), render_mode is not None
-    request = RunRequest(
-        units=units,
-        jitter=jitter,
-        settings=project.settings,
-        catalogue=project.catalogue,
-        shown=shown,
-    )
-    first = Simulation(project.layout, request)
-
-    def made() -> gymnasium.Env[Any, Any]:
-        return FactoryEnv(first, interval, max_time, render_mode)
-
-    return made() if worlds is None else gym.vector.SyncVectorEnv([made] * worlds)
+    check_values({"seconds": seconds})
+    check_choice("aim", aim, AIMS)
+    for name, value, valid in (("up", up, tuple(UPS)), ("unit", unit, LENGTHS)):
+        if value is not None:
+            check_choice(name, value, valid)
+    operations, file = all_templates(templates), path_of(source)
+    fast = None if screws is None else tuple(screws)
+    options = SourceOptions(unit, tuple(keep), replan, maybe(library), boxes, in_place, fast)
+    placed = read_source(file, operations, options)
+    meant, passing = overlaps_in(allow, {part.label for part in placed.parts})
+    placed = replace(placed, allowed=(*placed.allowed, *meant))
+    search = PlanOptions(aim, seconds, passing, hulls, UPS[up] if up else None, base, fast)
+    planned = planned_for(placed, replace(search, templates=operations))
+    if isinstance(planned, CannotAssemble):
+        raise InputError(refusal(planned))
+    files = write_planned(placed, planned, path_of(output), file, passing, operations)
+    return PlannedAssembly(read(files[0], templates).pag, planned, files)

@@ -50,13 +50,14 @@ APPS = (
     ("pareto", "live"),
     ("plc",),
     ("environment",),
+    ("making",),
 )
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
 
 ENTRANCES = (
     *("commands", "apps.*.command_line"),
-    *("stages", "studies", "searches", "notebook", "__init__", "__main__"),
+    *("stages", "studies", "views", "notebook", "__init__", "__main__"),
 )
 """Above the core and the apps, from the lowest up: the command line, the commands that apps give,
 the functions that a user calls, how values are shown."""

@@ -47,7 +47,7 @@ VALUES = (
     *("engine.record.figures.PhysicsFigures", "apps.exports.build.Built"),
     *("apps.runs.pictures.Rendered", "apps.report.page.RunReport"),
     *("apps.analyze.analysing.Analysis", "apps.sweep.summary.Summary"),
-    *("searches.PlannedAssembly", "apps.pareto.front.ParetoFront"),
+    *("studies.PlannedAssembly", "apps.pareto.front.ParetoFront"),
     *("apps.revise.revision.Revision", "apps.fidelity.record.Fidelity"),
 )
 """What the calls take and give."""

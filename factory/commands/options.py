@@ -239,6 +239,11 @@ RUNS = gathered(RunOptions, "asked")
 JOBS = click.option(
     "--jobs", type=bounded("jobs"), help="Number of processes (default: one per core)."
 )
+ON = click.option(
+    "--on",
+    metavar="ADDRESS",
+    help="Run on the workers of a Dask scheduler, for example tcp://10.0.0.1:8786.",
+)
 LIBRARY = click.option(
     "--library", type=PATH, envvar="LDRAWDIR", help="Folder of an LDraw parts library."
 )

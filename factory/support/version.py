@@ -22,6 +22,7 @@ EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "export": (("ezdxf", "foxglove-sdk"), "DXF and MCAP"),
         "usd": (("usd-core",), "USD"),
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
+        "cluster": (("distributed",), "many runs on a Dask cluster (`--on`)"),
         "step": (("cascadio",), "`plan` of STEP files"),
     }
 )

@@ -13,7 +13,7 @@ import click
 from factory.api import Diagnostic, usage_error
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, SECONDS, SOURCE
+from factory.commands.options import FLOOR, MOTION, ON, OUT, OUTPUT, SECONDS, SOURCE
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -55,6 +55,7 @@ PAGE_NAME = "pareto.html"
     default=True,
     help="Lay out and certify the points (default), or estimate them.",
 )
+@ON
 @FLOOR
 @MOTION
 @OUTPUT
@@ -62,6 +63,7 @@ def pareto(
     options: ProjectOptions,
     out: OutputOptions,
     trials: int,
+    on: str | None,
     output: Path | None,
     layouts: bool,
 ) -> int:
@@ -83,7 +85,7 @@ def pareto(
     project = options.project(out.silent)
     warnings = announced(project.warnings, out)
     effort = Effort(layouts, options.effort, options.limit or inf, options.branches())
-    front, stopped = _found(project, effort, trials, out)
+    front, stopped = _found(project, effort, trials, out, on)
     commands, files = _written(front, project, output)
     if out.as_json:
         points = zip(front.points, commands, strict=True)
@@ -102,12 +104,13 @@ def pareto(
 
 
 def _found(
-    project: Project, effort: Effort, trials: int, out: OutputOptions
+    project: Project, effort: Effort, trials: int, out: OutputOptions, on: str | None
 ) -> tuple[ParetoFront, StoppedError | None]:
     """The front, with the runs of `trials` of its points; and the error of an interruption, if the
     user stopped the search after a first point."""
     from factory.apps.pareto import FrontSweep
     from factory.apps.pareto.front import tried
+    from factory.apps.sweep.workers import each_of
     from factory.support.progress import StepBar
 
     front = None
@@ -121,9 +124,11 @@ def _found(
             sweep.look()
             front = sweep.front()
             numbers = front.spread(trials)
-            for done, number in enumerate(numbers):
+            projects = [front.points[number].project for number in numbers]
+            bar.show("running in both worlds", 0, len(numbers))
+            for done, (number, trial) in enumerate(each_of(tried, projects, on), 1):
+                front = front.with_trial(numbers[number], trial)
                 bar.show("running in both worlds", done, len(numbers))
-                front = front.with_trial(number, tried(front.points[number].project))
         except KeyboardInterrupt:
             front = front or sweep.front()
             if not front.points:
