@@ -191,8 +191,6 @@ def test_a_robot_is_paused_and_other_faults_are_shown(browser: Any) -> None:
     )
     campaign = Campaign(faults, clear=1.0, spares=1, swap=2.0)
     watched = Watched(browser, campaign)
-    watched.page.locator("#speed").select_option("0.25")
-    watched.press("Restart")  # the page may open when the first fault is over
     watched.until("f.outages.told.some(([mark]) => mark === 'dark')")
     watched.until("f.outages.told.some(([mark]) => mark === 'empty')")
     assert "part1 is empty" in watched.page.locator("#outages .empty").inner_text()
