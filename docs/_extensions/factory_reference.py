@@ -37,7 +37,7 @@ PACKAGE = ROOT / "factory"
 
 CALLS = (
     *("load_pag", "compile", "verify", "lay_out", "run", "build", "render", "report", "analyze"),
-    *("export", "sweep", "plan", "to_networkx"),
+    *("export", "sweep", "plan", "pareto", "fidelity", "revise", "to_networkx"),
 )
 VALUES = (
     *("support.settings.Settings", "theory.problem.pag.PAG", "theory.problem.pag.Assembly"),
@@ -47,7 +47,8 @@ VALUES = (
     *("engine.record.figures.PhysicsFigures", "apps.exports.build.Built"),
     *("apps.runs.pictures.Rendered", "apps.report.page.RunReport"),
     *("apps.analyze.analysing.Analysis", "apps.sweep.summary.Summary"),
-    *("studies.PlannedAssembly",),
+    *("studies.PlannedAssembly", "apps.pareto.front.ParetoFront"),
+    *("apps.revise.revision.Revision", "apps.fidelity.record.Fidelity"),
 )
 """What the calls take and give."""
 

@@ -71,13 +71,13 @@ def test_robots_tokens_and_bars_move(watched: Watched) -> None:
         watched.seen(moved, f"({look})()")
     watched.press("Pause")
     watched.until("!f.playing")
-    watched.page.wait_for_timeout(300)
-    robot, tokens, bars = watched.page.evaluate(look)
+    world = watched.running.session.simulation.world
+    there = pytest.approx(world.d.xpos[world.m.body("r2/carriage").id].tolist(), abs=1e-3)
+    until(lambda: watched.page.evaluate("factoryView.robot(1)") == there)
+    _, tokens, bars = watched.page.evaluate(look)
     assert {*bars} - {*first[2]}, "bars of later units"
     frame = watched.page.evaluate("factoryView.frame")
     assert sorted(map(int, tokens)) == sorted(frame["marked"]), "the drawing is the marking"
-    world = watched.running.session.simulation.world
-    assert robot == pytest.approx(world.d.xpos[world.m.body("r2/carriage").id], abs=1e-3)
     assert watched.trouble == []
 
 

@@ -125,6 +125,20 @@ def test_words_in_bars_are_whole_or_out_of_sight(tab: Tab) -> None:
     assert "whole" in found and "cut" not in found
 
 
+def test_letters_of_the_net_can_be_read(tab: Tab) -> None:
+    """At any scale: those that would be too small are left out, but for the names of robots."""
+    script = """texts => texts.filter(t => getComputedStyle(t).display !== 'none').map(
+        t => parseFloat(getComputedStyle(t).fontSize) * t.getScreenCTM().a)"""
+    texts = tab.page.locator(".net text")
+    shown = texts.evaluate_all(script)
+    assert len(shown) == texts.count() and min(shown) > 8.99
+    for _ in range(6):
+        tab.page.locator("#net-out").click()
+    far = texts.evaluate_all(script)
+    assert len(far) == tab.page.locator(".net .name").count() == 6 and min(far) > 8.99
+    tab.page.locator("#net-fit").click()
+
+
 CLICKS = {
     "tree": (".node[data-label='3']", "label"),
     "gantt": ("#gantt button[data-robot='2']", "robot"),
