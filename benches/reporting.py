@@ -132,8 +132,8 @@ class Report:
 
 
 OLD = (
-    "**Older than the physics that they describe** are the figures of these sections, because"
-    f" {', '.join(PHYSICS[:-1])} or {PHYSICS[-1]} has changed since: {{}}."
+    f"**Out of date** ({', '.join(PHYSICS[:-1])} or {PHYSICS[-1]} has changed since they were"
+    " measured): {}."
 )
 
 

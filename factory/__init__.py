@@ -30,12 +30,13 @@ from factory.stages import (
     to_networkx,
     verify,
 )
-from factory.studies import analyze, plan, render, report, sweep
+from factory.studies import analyze, fidelity, pareto, plan, revise, sweep
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.namesake import MEND as _MEND
 from factory.support.namesake import is_mixed as _is_mixed
 from factory.support.settings import Settings
 from factory.support.version import __version__ as __version__
+from factory.views import env, render, report
 
 __all__ = [
     "Diagnostic",
@@ -47,12 +48,16 @@ __all__ = [
     "analyze",
     "build",
     "compile",
+    "env",
     "export",
+    "fidelity",
     "lay_out",
     "load_pag",
+    "pareto",
     "plan",
     "render",
     "report",
+    "revise",
     "run",
     "sweep",
     "to_networkx",

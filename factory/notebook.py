@@ -9,9 +9,11 @@ from factory.support.showing import DRAWINGS
 
 if TYPE_CHECKING:
     from factory.engine.simulation.run import Run
+    from factory.floor.layout.certificate import Certificate
     from factory.floor.layout.layout import Layout
     from factory.theory.nets.gears import GearNet
     from factory.theory.nets.marked import MarkedNet
+    from factory.theory.nets.verdict import Verdict
     from factory.theory.plant.factory import Factory
     from factory.theory.problem.pag import PAG
 
@@ -53,6 +55,29 @@ def _run(run: Run) -> str:
     return f"<pre>{escape(chr(10).join(figures(run)))}</pre>"
 
 
+def _verdict(verdict: Verdict) -> str:
+    """Each property, whether it holds, and why not."""
+    from factory.apps.drawing.tables import titled
+
+    rows = (
+        (
+            name.replace("_", " "),
+            {True: "proved", False: "does not hold", None: "undecided"}[getattr(verdict, name)],
+            "; ".join(str(one) for one in verdict.witness if one.property == name),
+        )
+        for name in verdict.properties
+    )
+    return titled(repr(verdict), ("property", "", "witness"), rows)
+
+
+def _certificate(certificate: Certificate) -> str:
+    """Its figures and, where it fails, its faults."""
+    from factory.apps.drawing.tables import titled
+
+    faults = (("fault", str(fault.diagnostic())) for fault in certificate.faults)
+    return titled(repr(certificate), ("", ""), (*certificate.summary().items(), *faults))
+
+
 DRAWINGS |= {
     "PAG": _tree,
     "GearNet": _net,
@@ -60,4 +85,6 @@ DRAWINGS |= {
     "Factory": _factory,
     "Layout": _floor,
     "Run": _run,
+    "Verdict": _verdict,
+    "Certificate": _certificate,
 }

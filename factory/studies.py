@@ -1,106 +1,27 @@
-"""The public functions that show a factory, study it, and plan the assembly of a product."""
+"""The public functions that study a factory, revise it, and plan the assembly of a product."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from factory.stages import AnyPath, Stage, maybe, named, path_of, project_of
+from factory.stages import AnyPath, Stage, maybe, path_of, project_of
 from factory.support.guard import guarding, will_write
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
     from factory.apps.analyze import Analysis
+    from factory.apps.fidelity.record import Fidelity
+    from factory.apps.pareto import ParetoFront
     from factory.apps.planning.plan import Planned
-    from factory.apps.report.page import RunReport
-    from factory.apps.runs.executing import Tell
-    from factory.apps.runs.pictures import Rendered
+    from factory.apps.revise.revision import Revision
     from factory.apps.sweep.summary import Summary
     from factory.engine.simulation.run import Run
-    from factory.film.picture import PanelName, RendererName
     from factory.support.bounds import WorldName
     from factory.theory.problem.pag import PAG
-
-
-def _logged(product: Stage) -> Path | None:
-    """The path of the log of a run; None where a product is given."""
-    from factory.apps.log import is_log
-
-    path = named(product)
-    return path if path is not None and is_log(path) else None
-
-
-@guarding
-def render(
-    product: Stage,
-    output: AnyPath,
-    *,
-    size: tuple[int, int] = (1280, 720),
-    camera: str = "tour",
-    panels: Sequence[PanelName] = (),
-    title: str = "",
-    fps: float = 30,
-    at: float | Literal["end"] = "end",
-    poster: AnyPath | None = None,
-    renderer: RendererName = "auto",
-    units: int = 1,
-    seed: int = 0,
-    jitter: float = 0.0,
-    wip: int | None = None,
-    max_time: float | None = None,
-    settings: Settings | None = None,
-    progress: Tell | None = None,
-) -> Rendered:
-    """Film a run (.mp4), or take a still of it (.png) at a time [s] or at its end; of a log, of the
-    run that is in it.
-
-    `size` (width, height) [px]; `camera`: tour, overview, orbit, top, product, part:LABEL or
-    handover:LABEL; `panels` beside the 3-D: net, gantt; `poster`: a still of a film's best moment;
-    `renderer`: classic, filament, or auto, which takes filament for stills where it works.
-    The others are those of `run`. Raises InputError, MissingError without GL, RunError.
-    """
-    from factory.apps.log import read_log
-    from factory.apps.runs.options import RunOptions
-    from factory.apps.runs.pictures import render as taken
-    from factory.film.picture import Picture
-    from factory.film.shot import Shot
-
-    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
-    picture = Picture(size, camera, panels=tuple(panels), title=title, renderer=renderer)
-    shot = Shot(path_of(output), picture, fps, at, maybe(poster))
-    will_write(shot.output, shot.poster)
-    log = _logged(product)
-    source = read_log(log) if log else project_of(product, settings)
-    return taken(source, shot, asked, progress=progress)
-
-
-@guarding
-def report(
-    product: Stage,
-    output: AnyPath | None = None,
-    *,
-    units: int = 4,
-    seed: int = 0,
-    jitter: float = 0.0,
-    wip: int | None = None,
-    max_time: float | None = None,
-    settings: Settings | None = None,
-    progress: Tell | None = None,
-) -> RunReport:
-    """The page about a run of a product, or about the run in a log; a notebook shows it. Written to
-    `output` where that is given. The others are those of `run`. Raises InputError, RunError."""
-    from factory.apps.report.page import report_on
-    from factory.apps.runs.options import RunOptions
-    from factory.support.files import write_text
-
-    asked = RunOptions("mujoco", units, seed, jitter, wip, max_time=max_time)
-    will_write(maybe(output))
-    made = report_on(_logged(product) or project_of(product, settings), asked, progress=progress)
-    if output is not None:
-        write_text(path_of(output), made.text)
-    return made
 
 
 def analyze(
@@ -171,12 +92,14 @@ def sweep(
     jobs: int | None = None,
     retry: bool = False,
     settings: Settings | None = None,
+    on: str | None = None,
 ) -> Summary:
     """Run a product for every combination of the varied values ({"seed": range(100)}), keep the
     results in a database (SQLite) and summarise them. Called again, it continues where it stopped.
 
-    `jobs`: processes, one per core by default; `retry`: failed runs are repeated. The others are
-    those of `run`. Raises InputError, RunError.
+    `jobs`: processes, one per core by default; `on`: address of a Dask scheduler, whose workers are
+    taken instead; `retry`: failed runs are repeated. The others are those of `run`. Raises
+    InputError, RunError.
     """
     from factory.apps.sweep.grid import read_axes
     from factory.apps.sweep.pool import cores
@@ -194,8 +117,78 @@ def sweep(
     will_write(kept)
     project = project_of(product, settings)
     recipe = recipe_of(project, axes, {**shared, "world": world}, max_time, fuse)
-    swept(recipe, axes, kept, jobs or cores(), retry)
+    swept(recipe, axes, kept, jobs or cores(), retry, on=on)
     return summarise(kept)
+
+
+def fidelity(
+    product: Stage,
+    *,
+    seeds: int = 5,
+    units: int | None = None,
+    jitter: float = 0.3,
+    jobs: int | None = None,
+    max_time: float | None = None,
+    settings: Settings | None = None,
+) -> Fidelity:
+    """How close MuJoCo is to the ideal world, from runs in both over so many `seeds`, each of so
+    many `units`, None for as many as show the cycle time. `jobs`: processes, one per core by
+    default. The others are those of `run`. Raises InputError, RunError."""
+    from factory.apps.fidelity import measure
+    from factory.apps.sweep.pool import cores
+    from factory.support.bounds import check_values
+    from factory.theory.nets.verify import proved
+
+    check_values({"units": units, "jitter": jitter, "max_time": max_time, "jobs": jobs})
+    project = project_of(product, settings)
+    proved(project.layout.factory.net)
+    runs = range(seeds), units, jitter, project.settings, jobs or cores(), None, max_time
+    return measure(project.layout, *runs)
+
+
+def pareto(
+    product: Stage,
+    *,
+    validate: int = 0,
+    effort: int | None = None,
+    seconds: float | None = None,
+    layouts: bool = True,
+    settings: Settings | None = None,
+) -> ParetoFront:
+    """The Pareto-optimal factories of a product in robots, cycle time and floor area.
+
+    `validate`: number of points that are run in both worlds; `effort`: number of factories to lay
+    out; `seconds`: time limit [s]; without `layouts` they are estimated. Raises InputError,
+    RunError where no factory has a layout."""
+    from factory.apps.pareto import Effort
+    from factory.apps.pareto import pareto as searched
+    from factory.apps.pareto.front import tried
+    from factory.support.bounds import check_values
+    from factory.support.errors import usage_error
+
+    if validate and not layouts:
+        raise usage_error("without layouts there is nothing to run", "leave out validate")
+    check_values({"seconds": seconds})
+    bounds = Effort(layouts, effort, inf if seconds is None else seconds)
+    front = searched(project_of(product, settings), bounds)
+    for number in front.spread(validate) if validate else ():
+        front = front.with_trial(number, tried(front.points[number].project))
+    return front
+
+
+def revise(old: Stage, new: Stage, *, pin: Literal["all", "hands", "none"] = "all") -> Revision:
+    """What stays of the factory of a product in that of its next revision, laid out so that most
+    does; a notebook shows it as a picture. `pin`: what of the old layout is kept, or less where no
+    layout has that. Raises InputError for shared robots, RunError where there is no layout."""
+    from factory.apps.revise.revision import revised
+    from factory.support.bounds import check_choice
+    from factory.theory.nets.verify import proved
+
+    check_choice("pin", pin, ("all", "hands", "none"))
+    before = project_of(old)
+    revision = revised(before, project_of(new, before.settings), pin)
+    proved(revision.new.layout.factory.net)
+    return revision
 
 
 class PlannedAssembly(NamedTuple):

@@ -125,11 +125,13 @@ def here() -> Iterator[None]:
     from factory.apps.sweep import sweeping
     from factory.apps.sweep.work import Runner
 
-    def run_here(recipe: Recipe, wanted: Sequence[Point], jobs: int) -> Iterator[Outcome]:
+    def run_here(
+        recipe: Recipe, wanted: Sequence[Point], jobs: int, on: str | None
+    ) -> Iterator[Outcome]:
         yield from map(Runner(recipe), wanted)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sweeping, "run_local", run_here)
+        patch.setattr(sweeping, "outcomes_of", run_here)
         yield
 
 

@@ -41,21 +41,23 @@ beside it. Above them are the apps, then the commands."""
 
 APPS = (
     ("drawing",),
-    ("foreign_nets", "importing", "few_robots", "relay", "platen", "revise", "log", "deviations"),
+    ("foreign_nets", "importing", "few_robots", "relay", "platen", "log", "deviations"),
     ("monitor", "recovery", "planning", "analyze", "exports"),
-    ("runs", "resume"),
+    ("runs", "resume", "revise"),
     ("sweep",),
     ("fidelity",),
     ("report",),
     ("pareto", "live"),
     ("plc",),
+    ("environment",),
+    ("making",),
 )
 """The apps, from those that use no other app up. An app imports `factory.api`, itself, and the apps
 below it."""
 
 ENTRANCES = (
     *("commands", "apps.*.command_line"),
-    *("stages", "studies", "notebook", "__init__", "__main__"),
+    *("stages", "studies", "views", "notebook", "__init__", "__main__"),
 )
 """Above the core and the apps, from the lowest up: the command line, the commands that apps give,
 the functions that a user calls, how values are shown."""

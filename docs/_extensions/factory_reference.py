@@ -60,9 +60,10 @@ def commands() -> str:
     shared = {p.name for p in every_command()["doctor"].params}
     lines = [heading(1, "Commands"), prose(cli.help or "")]
     lines.append(
-        "Every command takes `--json` (one document on stdout), `-q`, `-v` and `-h`. Exit status: "
-        "0 ok, 1 a check or run failed, 2 bad input, 3 something missing on the machine, 130 "
-        "interrupted. `factory --version` and `factory --explain CODE` stand alone."
+        "Every command takes `--json` (one document on stdout), `-q`, `-v`, `-h` (the common "
+        "options) and `--help` (all). Exit status: 0 ok, 1 a check or run failed, 2 bad input, "
+        "3 something missing on the machine, 130 interrupted. `factory --version` and "
+        "`factory --explain CODE` stand alone."
     )
     for name, command in every_command().items():
         context = click.Context(command, top, info_name=name)

@@ -51,7 +51,10 @@ def build(
     units: int | None,
     wip: int | None,
 ) -> int:
-    """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
+    """Write the factory of FILE.pag: MJCF, floor plan, net.
+
+    The PAG is compiled, verified and laid out first.
+    """
     from factory.support.cache import build_name, find_build, keep_build
 
     begin = perf_counter()
@@ -111,6 +114,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     from factory.floor.layout.hands.bores import bores
     from factory.floor.layout.tiles import fill_of, tiles_of
     from factory.support.settings import AUTO
+    from factory.theory.lang.source import counted
 
     layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)
@@ -138,8 +142,8 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         document |= {"tiles": len(tiles), "tile_m": layout.tile, "fill": fill_of(layout, tiles)}
         ground += f", {len(tiles)} tiles of {layout.tile * 1000:g} mm"
     lines = [
-        f"{root}: {robots} robots, {model.bodies} bodies of parts, {model.joints} joints, "
-        f"{model.welds} welds",
+        f"{root}: {counted(robots, 'robot')}, {model.bodies} bodies of parts, "
+        f"{counted(model.joints, 'joint')}, {counted(model.welds, 'weld')}",
         f"{ground}, guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
         f"timestep {1000 * model.settings.step:g} ms"

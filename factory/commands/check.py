@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,8 +39,14 @@ if TYPE_CHECKING:
     from factory.theory.nets.verdict import Witness
     from factory.theory.problem.pag import AllowedOverlap
 
-SHOWN = 24
+SHOWN = 16
 """The most robots that are printed, unless `-v` asks for all."""
+
+MODES = 8
+"""The most modes of a gear that are printed, unless `-v` asks for all."""
+
+NOUNS = ("robot", "place", "transition", "token")
+"""What is counted of a net."""
 
 PICTURES = "Folder for pictures of blocked operations and of parts that no hand can hold."
 """The help of `--clashes`."""
@@ -82,7 +88,10 @@ def check(
     wip: int | None,
     clashes: Path | None,
 ) -> int:
-    """Parse, compile and prove FILE.pag (or a net in FILE.pnml), or check its certificate."""
+    """Compile FILE.pag and prove it live, or check a certificate.
+
+    FILE may be a net in PNML.
+    """
     if folder is not None:
         without_others("folder", f"--clearance '{folder}'")
         return _check_clearance(folder, out)
@@ -184,15 +193,13 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]) -> None:
     """Print the gears, the counts and the verdict."""
+    from factory.theory.lang.source import counted
+
     document = checked.as_json()
     gears = document["gears"]
     shown = gears if verbose else gears[:SHOWN]
     rows = (
-        (
-            g["robot"],
-            g["type"],
-            " · ".join(f"{p['mode']} {p['label']}".strip() for p in g["places"]),
-        )
+        (g["robot"], g["type"], _modes(g["places"], len(g["places"]) if verbose else MODES))
         for g in shown
     )
     if gears:
@@ -201,8 +208,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
     made = checked.factory.pag.title if checked.factory else checked.name
     say(
-        f"{made}: {document['robots']} robots, {document['places']} places,"
-        f" {document['transitions']} transitions, {document['tokens']} tokens,"
+        f"{made}: {', '.join(counted(document[f'{noun}s'], noun) for noun in NOUNS)},"
         f" largest mode {document['largest_mode']}"
     )
     words = {True: "yes", False: "NO", None: "undecided"}
@@ -223,6 +229,13 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         say(f"copies of each part inside at once: {listed}{more}")
     if checked.matings is not None:
         _describe_approaches(checked.matings, allowed)
+
+
+def _modes(places: Sequence[Mapping[str, str]], most: int) -> str:
+    """The modes of a gear in words: all, or the first ones and how many more."""
+    words = [f"{place['mode']} {place['label']}".strip() for place in places]
+    more = [f"{len(words) - most} more"] if len(words) > most else []
+    return " · ".join([*words[:most], *more])
 
 
 def _describe_coordinated(coordinated: CoordinatedNet) -> None:
@@ -254,8 +267,11 @@ def _describe_approaches(matings: Matings, allowed: Sequence[AllowedOverlap]) ->
     passing = len(matings.of_kind("blocked")) - blocked
     every = len(matings.all)
     clear = f"{left_out} of {every} operations clear"
-    if not strict == no_deeper == left_out == every:
-        clear += f" but for overlaps when finished, {no_deeper} never deeper, {strict} strictly"
+    if not strict == no_deeper == left_out:
+        clear += (
+            f" ({no_deeper} with no overlap deeper than in the finished product,"
+            f" {strict} with no overlap)"
+        )
     say(
         f"approach: {clear}; {lowered} lowered"
         f"{f', {passing} allowed to pass through each other' if passing else ''},"

@@ -73,10 +73,10 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
-def gathered(kind: type, name: str) -> Callable[[F], F]:
-    """A decorator that passes the options that are fields of a dataclass to a command as one value,
-    by this name."""
-    names = [field.name for field in fields(kind)]
+def gathered(kind: type, name: str, but: str = "") -> Callable[[F], F]:
+    """A decorator that passes the options that are fields of a dataclass, `but` for one, to a
+    command as one value, by this name."""
+    names = [field.name for field in fields(kind) if field.name != but]
 
     def decorate(command: F) -> F:
         @wraps(command)
@@ -227,7 +227,7 @@ RELAY = options(
         "--seconds",
         "limit",
         type=SECONDS,
-        help="Time limit of the search for few robots [s]; a search that it cuts short says so.",
+        help="Time limit of the search for few robots [s]; a message says if it was reached.",
     ),
 )
 WIP = click.option(
@@ -239,13 +239,18 @@ RUNS = gathered(RunOptions, "asked")
 JOBS = click.option(
     "--jobs", type=bounded("jobs"), help="Number of processes (default: one per core)."
 )
+ON = click.option(
+    "--on",
+    metavar="ADDRESS",
+    help="Run on the workers of a Dask scheduler, for example tcp://10.0.0.1:8786.",
+)
 LIBRARY = click.option(
     "--library", type=PATH, envvar="LDRAWDIR", help="Folder of an LDraw parts library."
 )
 LENIENT = click.option(
     "--lenient",
     is_flag=True,
-    help="Let a run that makes its units succeed, whatever its bodies do.",
+    help="Accept a run that makes its units, whatever the verdict on its bodies.",
 )
 STRICT = click.option("--strict", is_flag=True, help="Fail a run that 'succeeded, but ...'.")
 DRAW = options(

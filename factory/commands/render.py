@@ -46,7 +46,10 @@ def render(
     output: Path,
     at: str,
 ) -> int:
-    """Film FILE.pag, or the run in a LOG written by `run --log`, headless through EGL."""
+    """Film a run of FILE.pag, or the run in a LOG.
+
+    `run --log` writes a LOG. Pictures are drawn headless, through EGL.
+    """
     from factory.apps.log import is_log
     from factory.apps.runs.pictures import render as taken
     from factory.film.shot import Shot
@@ -61,12 +64,12 @@ def render(
     warnings: list[dict[str, object]] = []
     if is_log(file):
         log = read_partly(file, out.silent)
-        frames, _ = taken(log, shot)
+        frames, _, _ = taken(log, shot)
     else:
         asked.check_combination()
         project = options.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
-        frames, run = taken(project, shot, asked, out.silent)
+        frames, run, _ = taken(project, shot, asked, out.silent)
         if run is not None:
             warn(run.verdict.bodies, out.silent)
     seconds = 0.0 if is_still else round(frames / shown.fps, 6)

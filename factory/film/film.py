@@ -9,8 +9,9 @@ from factory.engine.mjcf.model import product_name
 from factory.engine.record.state import Recorder, State
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot, held
-from factory.film.camerawork import Moment, Take, When, past_the_end, pictureless
+from factory.film.camerawork import Camerawork, Moment, Take, When, past_the_end, pictureless
 from factory.film.history import TIE, History
+from factory.film.ink import Pixels
 from factory.film.picture import USUAL, Picture
 from factory.film.reel import Reel, save
 from factory.film.video import FPS, check_output
@@ -135,3 +136,23 @@ class Still(_Observer):
     def __exit__(self, *raised: object) -> None:
         if self._has_come or raised[0] is None:
             self.close()
+
+
+class Glimpses(_Observer):
+    """Pictures of a run as it is when one is asked for. Raises InputError in the ideal world,
+    MissingError where there is no GL."""
+
+    def __init__(self, simulation: Simulation, picture: Picture = USUAL) -> None:
+        super().__init__(simulation, picture)
+        self._run, self._camera = simulation, Camerawork(self.take)
+
+    def draw(self) -> Pixels:
+        """A picture (height, width, 3)."""
+        return self._camera.picture(self._moment(self._run.state()))
+
+    def observe(self, state: State) -> None:
+        """Nothing: no picture is asked for."""
+
+    def close(self) -> None:
+        """Give the GL context back."""
+        self._camera.close()

@@ -340,8 +340,7 @@ class NetPanel:
 
     def _token(self, ink: Ink, row: PanelRow) -> None:
         x, y = self._at(row)
-        if x > self.sheet.gutter - self.rings.radius:
-            ink.disc(x, y, self.rings.radius, WHITE, row.alpha)
-            ink.disc(
-                x, y, self.rings.radius - 1.4 * self.sheet.scale, self.paints[row.robot], row.alpha
-            )
+        radius, rim = self.rings.radius, 1.4 * self.sheet.scale
+        if x > self.sheet.gutter - radius:
+            ink.disc(x, y, radius, WHITE, row.alpha)
+            ink.disc(x, y, radius - rim, self.paints[row.robot], row.alpha)

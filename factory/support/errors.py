@@ -118,6 +118,10 @@ class FactoryError(Exception):
     def __str__(self) -> str:
         return "\n".join(printed(self.diagnostics, "errors"))
 
+    def _render_traceback_(self) -> list[str]:
+        """What a notebook shows of it: the diagnostics, not the code that found them."""
+        return str(self).splitlines()
+
     def __reduce__(self) -> tuple[type[FactoryError], tuple[tuple[Diagnostic, ...]]]:
         return type(self), (self.diagnostics,)
 

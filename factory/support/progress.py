@@ -163,15 +163,21 @@ class Progress(ProgressBar):
                 completed=self.seconds if made >= self.units else min(state.time, self.seconds),
                 time=f"{state.time:.1f} s",
                 units=f"{made}/{self.units}",
-                speed=f"{state.time / max(wall, 1e-9):.1f} x real time",
+                speed=f"{paced(state.time / max(wall, 1e-9))} x real time",
             )
 
     def _line(self, made: int, time: float, wall: float) -> str:
         left = f", at most {_clock(wall * (self.seconds / time - 1))} left"
+        speed = f"{paced(time / wall)} x real time"
         return (
-            f"{made} of {self.units} units, {time:.1f} s simulated, {time / wall:.1f} x real time"
+            f"{made} of {self.units} units, {time:.1f} s simulated, {speed}"
             f"{left if time < self.seconds else ''}"
         )
+
+
+def paced(factor: float) -> str:
+    """How many times as fast as real time: with one decimal, below 0.1 with two digits."""
+    return f"{factor:.1f}" if factor >= 0.1 else f"{factor:.2g}"
 
 
 def _clock(seconds: float) -> str:

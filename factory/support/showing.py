@@ -10,14 +10,23 @@ from collections.abc import Callable
 from typing import Any
 
 DRAWINGS: dict[str, Callable[[Any], str | None]] = {}
-"""For a class the function from a value to its SVG, or of a run to its HTML; None for a value that
-is too large to be drawn."""
+"""For a class the function from a value to its SVG (`Pictured`) or to its HTML (`Told`); None for a
+value that is too large to be drawn."""
 
 
 class Pictured:
     """A value that a notebook shows as a picture."""
 
     def _repr_svg_(self) -> str | None:
+        return drawn(self)
+
+
+class Told:
+    """A value that a notebook shows in words and figures."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str | None:
         return drawn(self)
 
 

@@ -18,9 +18,11 @@ EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
         "live": (("websockets",), "`view`, in the browser"),
         "opcua": (("asyncua",), "`plant`, for a PLC"),
+        "gym": (("gymnasium",), "`factory.env`, for learning"),
         "export": (("ezdxf", "foxglove-sdk"), "DXF and MCAP"),
         "usd": (("usd-core",), "USD"),
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
+        "cluster": (("distributed",), "many runs on a Dask cluster (`--on`)"),
         "step": (("cascadio",), "`plan` of STEP files"),
     }
 )

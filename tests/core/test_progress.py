@@ -19,7 +19,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
-from factory.support.progress import Progress, Waiting
+from factory.support.progress import Progress, Waiting, paced
 from tests.examples import without_hands
 from tests.paths import ROOT
 from tests.screen import Screen
@@ -54,8 +54,14 @@ def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -
     monkeypatch.setattr(progress, "perf_counter", lambda: next(clock))
     watch(Progress(3, False, 5.0))
     first, second = stream.getvalue().splitlines()
-    assert first == "1 of 3 units, 1.0 s simulated, 0.0 x real time, at most 2:40 min left"
+    assert first == "1 of 3 units, 1.0 s simulated, 0.025 x real time, at most 2:40 min left"
     assert second.startswith("3 of 3 units, 3.0 s simulated")
+
+
+def test_a_slow_run_says_how_slow() -> None:
+    assert [paced(factor) for factor in (34.31, 0.1, 0.0876, 0.00412)] == [
+        *("34.3", "0.1", "0.088", "0.0041"),
+    ]
 
 
 def test_it_shows_units_and_speed(monkeypatch) -> None:

@@ -91,7 +91,7 @@ def test_a_report_says_which_sections_are_older_than_the_physics(
         (report.folder / f"{name}.json").write_text(json.dumps(kept | now))
     report.write()
     text = report.path.read_text()
-    assert "Older than the physics" in text.split("## ")[0] and "From PAG" in text.split("## ")[0]
+    assert "Out of date" in text.split("## ")[0] and "From PAG" in text.split("## ")[0]
     assert "Proofs against" not in text.split("## ")[0]
     monkeypatch.setattr(reporting, "physics", lambda: "another")
     assert "Proofs against" in report.text().split("## ")[0] and report.text() != text

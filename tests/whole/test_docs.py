@@ -82,7 +82,10 @@ def close(said: str, printed: str) -> bool:
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: None) -> Path:
-    """A folder with the examples, in which pictures are small; sweeps need no further process."""
+    """A folder with the examples, in which pictures are small; sweeps need no further process.
+    Pages
+    show what is printed without the extra `decompose`."""
+    monkeypatch.setattr("factory.floor.geometry.decomposition.can_decompose", lambda: False)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FACTORY_SIZE", "64x48")
@@ -226,6 +229,10 @@ WAY = re.compile(r"^\| (\d+) \| `([\w/]+\.py)` ((?:`\w+(?:\.\w+)?`(?:, )?)+) \|"
 """A row of the way from text to film: its number, a file, and functions or classes in it."""
 
 
+def test_the_map_is_short() -> None:
+    assert len((DOCS / "design.md").read_text("utf-8").splitlines()) <= 150
+
+
 def test_the_way_from_text_to_film_is_there_and_short() -> None:
     rows = WAY.findall((DOCS / "design.md").read_text("utf-8"))
     assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
@@ -255,6 +262,32 @@ def test_files_that_the_map_and_the_decisions_name_are_there() -> None:
         files = re.findall(r"`([\w]+(?:/[\w]+)+\.(?:py|op))`", page.read_text("utf-8"))
         for name in (*folders, *files):
             assert (package / name).exists() or (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_files_that_docstrings_name_are_there() -> None:
+    """Each module that a docstring names is a file, or the end of one's path; so is a folder in
+    backticks whose first part is one of the package."""
+    package = ROOT / "factory"
+    homes = (ROOT / name for name in ("factory", "tests", "benches", "tools", "docs", "mjcf"))
+    there = {f"/{p.relative_to(ROOT).as_posix()}" for home in homes for p in home.rglob("*")}
+    folders = {path.name for path in package.rglob("*") if path.is_dir()}
+    checked = 0
+    for path in package.rglob("*.py"):
+        for text in docstrings(ast.parse(path.read_text("utf-8"))):
+            for name in re.findall(r"(?<![\w/.])((?:\w+/)*\w+\.py)\b", text):
+                assert any(file.endswith(f"/{name}") for file in there), f"{path}: {name}"
+                checked += 1
+            for name in re.findall(r"`(\w+(?:/\w+)+)/?`", text):
+                if name.partition("/")[0] in folders:
+                    assert any(file.endswith(f"/{name}") for file in there), f"{path}: {name}"
+    assert checked >= 50
+
+
+def docstrings(tree: ast.Module) -> Iterator[str]:
+    """All docstrings in a module, of constants too."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            yield str(node.value.value)
 
 
 def test_the_glossary_names_what_is_there() -> None:

@@ -251,8 +251,8 @@ def test_the_monitor_catches_a_body_made_of_another_unit(
             kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
             grip = parts.holdings.weld[robot_code(robot), "part1"]
-            parts.welds.loose([parts.holdings.parking[parts.holdings.free["part1"][0]][0]])
-            parts.welds.join({grip: int(simulation.physical.m.eq_obj2id[grip])})
+            parts.welds.open([parts.holdings.parking[parts.holdings.free["part1"][0]][0]])
+            parts.welds.close({grip: int(simulation.physical.m.eq_obj2id[grip])})
 
     monkeypatch.setattr(Holdings, "put_away", faulty)
     monitor = beside(simulation)

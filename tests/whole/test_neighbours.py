@@ -308,7 +308,7 @@ def test_what_is_given_something_is_looked_at(
     body = int(next(iter(parts.holdings.body.values()))[-1])
     x, y, z = d.xpos[holder].tolist()
     parts.welds.place(body, (x, y, z + 1.0))
-    parts.welds.hold([body], int(code[holder]))
+    parts.welds.set_holder([body], int(code[holder]))
     parts.welds.write()
     world.advance(2)
     assert bool(m.body_contype[holder]) == noticed

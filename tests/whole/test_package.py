@@ -238,6 +238,39 @@ def test_values_are_shown_in_a_line_and_as_a_picture() -> None:
     assert "<script" in factory.report(layout, units=1)._repr_html_().replace("&lt;", "<")
 
 
+def test_results_are_shown_in_a_line_and_as_a_table(tmp_path: Path) -> None:
+    layout = factory.lay_out(PAPER)
+    swept = factory.sweep(PAPER, tmp_path / "a.db", {"seed": [0, 1]}, world="ideal")
+    results = (
+        (factory.verify(PAPER), "<Verdict by structure: gear net, live, safe", "proved"),
+        (layout.certificate, "<Certificate: holds, 6 robots", "clearance_m"),
+        (factory.build(PAPER, tmp_path / "built"), "<Built: a model of 11 bodies", "kB"),
+        (factory.analyze(layout), "<Analysis of sub3: cycle time 2.5", "with a second one"),
+        (factory.pareto(PAPER, layouts=False), "<ParetoFront of paper: ", "robots"),
+        (swept, "<Summary of sub3: 2 runs done, 0 failed", "cycle time [s]"),
+    )
+    for value, line, word in results:
+        assert repr(value).startswith(line), repr(value)
+        assert len(repr(value)) < 140 and "\n" not in repr(value)
+        assert "<table" in str(value._repr_html_()) and word in str(value._repr_html_())
+
+
+def test_a_refusal_is_shown_without_the_code_that_found_it(tmp_path: Path) -> None:
+    (tmp_path / "bad.pag").write_text("root = a; a = mate ( b );")
+    with pytest.raises(factory.InputError) as caught:
+        factory.load_pag(tmp_path / "bad.pag")
+    assert caught.value._render_traceback_() == str(caught.value).splitlines()
+
+
+def test_a_revision_is_a_line_and_a_drawing() -> None:
+    made = factory.revise(PAPER, PAPER)
+    assert (
+        repr(made)
+        == "<Revision paper.pag -> paper.pag: 6 robots stay, 6 as they were, 0 new, 0 gone>"
+    )
+    assert made._repr_svg_().count('class="dot stays"') == 6
+
+
 def test_what_is_too_large_is_not_drawn(tmp_path: Path) -> None:
     file = tmp_path / "many.pag"
     rows = [f"s{n} = mate ( s{n + 1}, p{n} ); p{n} = atomic();" for n in range(250)]

@@ -30,13 +30,13 @@ def test_what_is_said_last_of_a_weld_holds() -> None:
     m, d, welds = world.m, world.d, world.parts.welds
     one, other, third, fourth = [*world.parts.holdings.weld.values()][:4]
     before = int(m.eq_obj2id[other])
-    welds.join({one: 5})
-    welds.join({other: 6})
-    welds.join({third: 5})
-    welds.loose([other])
-    welds.loose([third])
-    welds.join({third: 7})
-    welds.loose([fourth])
+    welds.close({one: 5})
+    welds.close({other: 6})
+    welds.close({third: 5})
+    welds.open([other])
+    welds.open([third])
+    welds.close({third: 7})
+    welds.open([fourth])
     assert not d.eq_active[one], "nothing is written yet"
     welds.write()
     assert d.eq_active[[one, other, third, fourth]].tolist() == [1, 0, 1, 0]
@@ -53,8 +53,8 @@ def test_what_is_said_last_of_a_body_holds() -> None:
     parts.welds.place(body, (1.0, 2.0, 3.0))
     parts.welds.place(body, (4.0, 5.0, 6.0))
     parts.welds.place(other, (7.0, 8.0, 9.0))
-    parts.welds.hold([body, other], 3)
-    parts.welds.hold([other], NOBODY)
+    parts.welds.set_holder([body, other], 3)
+    parts.welds.set_holder([other], NOBODY)
     d.qvel[m.body_dofadr[body]] = 1.0
     parts.welds.write()
     at, v = m.jnt_qposadr[m.body_jntadr[body]], m.body_dofadr[body]
@@ -104,10 +104,10 @@ def test_what_a_weld_joins_and_joined_is_woken() -> None:
         d.tree_asleep[tree[name]] = tree[name]
         d.qvel[first[name]] = 0.0
     welds = parts.welds
-    welds.loose([weld])
-    welds.join({weld: int(parts.holdings.body["part1"][0])})
+    welds.open([weld])
+    welds.close({weld: int(parts.holdings.body["part1"][0])})
     part3 = int(parts.holdings.body["part3"][0])
-    welds.join({parts.feeders.welds["part3"]: part3, joins: part3})
+    welds.close({parts.feeders.welds["part3"]: part3, joins: part3})
     welds.write()
     for label, dofs in (("part1", 6), ("holder", 1), ("other", 1)):
         speeds = d.qvel[first[label] : first[label] + dofs]
@@ -123,7 +123,7 @@ def test_what_a_weld_lets_go_is_woken() -> None:
     tree, first = m.body_treeid[body], m.body_dofadr[body]
     d.tree_asleep[tree] = tree
     d.qvel[first : first + 6] = 0.0
-    parts.welds.loose([weld])
+    parts.welds.open([weld])
     parts.welds.write()
     assert np.signbit(d.qvel[first : first + 6]).any()
 
@@ -138,14 +138,14 @@ def test_gaps_are_those_where_bodies_are_taken_over() -> None:
     m, d, parts = world.m, world.d, world.parts
     grip, body = parts.holdings.weld[1, "part1"], int(parts.holdings.body["part1"][0])
     before, count = parts.welds.taken.gap, parts.welds.taken.count
-    parts.welds.join({grip: body})
+    parts.welds.close({grip: body})
     parts.welds.write()
     assert (parts.welds.taken.gap, parts.welds.taken.count) == (before, count)
     at = m.jnt_qposadr[m.body_jntadr[body]]
     holder = m.eq_obj1id[grip]
     turn = d.xmat[holder].reshape(3, 3)
     d.qpos[at : at + 3] = d.xpos[holder] + turn @ m.eq_data[grip, 3:6] + [0.0, 0.3, 0.4]
-    parts.welds.grip({grip: body})
+    parts.welds.close_and_measure({grip: body})
     parts.welds.write()
     assert parts.welds.taken.count == count + 1
     assert parts.welds.taken.gap == pytest.approx(0.5, abs=2e-3)
@@ -156,8 +156,8 @@ def test_a_loosened_grip_is_not_measured() -> None:
     world = under_way()
     parts, count = world.parts, world.parts.welds.taken.count
     grip, body = parts.holdings.weld[1, "part1"], int(parts.holdings.body["part1"][0])
-    parts.welds.grip({grip: body})
-    parts.welds.loose([grip])
+    parts.welds.close_and_measure({grip: body})
+    parts.welds.open([grip])
     parts.welds.write()
     assert not world.d.eq_active[grip]
     assert parts.welds.taken.count == count

@@ -1,6 +1,5 @@
 // What the report's 3-D view takes of three.js, and no more; tools/viewer/build bundles it.
 export {
-  AmbientLight,
   Box3,
   BufferAttribute,
   BufferGeometry,
@@ -8,15 +7,15 @@ export {
   DirectionalLight,
   DoubleSide,
   Group,
-  HemisphereLight,
   LineBasicMaterial,
   LineSegments,
   Mesh,
-  MeshLambertMaterial,
-  OrthographicCamera,
+  MeshStandardMaterial,
+  NeutralToneMapping,
   PCFShadowMap,
   PerspectiveCamera,
   PlaneGeometry,
+  PMREMGenerator,
   Raycaster,
   Scene,
   ShadowMaterial,
@@ -27,3 +26,4 @@ export {
 } from 'three';
 export { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 export { toCreasedNormals } from 'three/addons/utils/BufferGeometryUtils.js';
+export { RoomEnvironment } from 'three/addons/environments/RoomEnvironment.js';

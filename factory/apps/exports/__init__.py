@@ -26,9 +26,19 @@ Made = str | bytes | Mapping[str, bytes]
 
 @dataclass(frozen=True, slots=True)
 class Exporter:
-    """A format, what it takes, and what writes it; `of`: what `--of` means, "" for nothing;
-    `folder`: whether it writes a whole folder if asked to; `ending`: of its files, "" where that is
-    the format's name; `file`: the user's, None for those shipped."""
+    """A format, and what writes it.
+
+    Attributes:
+        format: its name.
+        takes: its source, a key of `TAKEN`.
+        summary: one line for `factory export --help`.
+        export: makes the content of a subject.
+        binary: whether that is bytes.
+        of: what `--of` means, "" for nothing.
+        folder: whether it can write a whole folder.
+        ending: ending of its files, "" where that is the format's name.
+        file: the module of a user's exporter; None for those shipped.
+    """
 
     format: str
     takes: str

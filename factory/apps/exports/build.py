@@ -17,10 +17,12 @@ from factory.api import (
     physical_model,
     write_all,
 )
+from factory.apps.drawing.tables import titled
 from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
 from factory.apps.exports.floor_sheet import write_svg
+from factory.apps.exports.goals import goals
 from factory.apps.exports.pnml import write_pnml
 from factory.apps.exports.program_text import write_program
 from factory.apps.exports.stock import model_files, written
@@ -60,6 +62,7 @@ DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
     "dot": lambda what: write_dot(what.project.layout.factory.net),
     "pnml": lambda what: write_pnml(what.project.layout.factory.net),
     "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "goals.json": lambda what: _json(goals(what.model)),
     "ways.json": lambda what: _json(ways(what.model)),
 }
 """Everything about a factory but the model: by the endings of their files, what writes the text."""
@@ -93,13 +96,27 @@ class BuildRequest:
 
 @dataclass(frozen=True)
 class Built:
-    """A build's model, its clearance certificate and its files, including those that existed
-    before; `mjcf`: the file of the model."""
+    """A build.
+
+    Attributes:
+        model: the MJCF model.
+        clearance: the clearance certificate.
+        mjcf: the file of the model; None where it was not written.
+        files: its files, including those that existed before.
+    """
 
     model: Model
     clearance: Certificate
     mjcf: Path | None
     files: tuple[Path, ...]
+
+    def __repr__(self) -> str:
+        counts = f"{self.model.bodies} bodies, {self.model.joints} joints"
+        return f"<Built: a model of {counts}; {len(self.files)} files>"
+
+    def _repr_html_(self) -> str:
+        sizes = ((file.name, f"{file.stat().st_size / 1e3:.1f} kB") for file in self.files)
+        return titled(repr(self), ("file", "size"), sizes)
 
 
 def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:

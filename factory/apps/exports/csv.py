@@ -21,9 +21,19 @@ from factory.support.errors import one_line
 
 @dataclass(frozen=True, slots=True)
 class EventRow:
-    """A transition that fired, or was undone, at `time_s` [s]. `kind`: start, end, start undone or
-    end undone; `operation`: the label it makes; `unit`: how often the transition has fired, less
-    how often it was undone; `robots`: those of the operation."""
+    """A transition that fired, or was undone.
+
+    Attributes:
+        time_s: time [s].
+        transition: its name.
+        kind: start, end, start undone or end undone.
+        operation: the label that the operation makes.
+        template: the operation's template.
+        unit: how often the transition has fired, less how often it was undone.
+        carrier: the carrier of the operation.
+        robots: the robots of the operation.
+        file, line, column: the place in the PAG.
+    """
 
     time_s: float
     transition: str

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,9 +24,18 @@ JUNCTION = 0.008
 
 @dataclass(frozen=True, slots=True)
 class Flat:
-    """A shape in plan. `style`: its kind; `points`: two opposite corners of a box, the middle of a
-    circle of `radius` [m], the ends of a line, or the corners of an area; `name`, `paint`: label
-    and colour (`#rrggbb`) of a part."""
+    """A shape in plan.
+
+    Attributes:
+        style: its kind.
+        points: two opposite corners of a box, the middle of a circle, the ends of a line, or
+            the corners of an area [m].
+        radius: of a circle [m].
+        box: whether it is a box.
+        name: of a part, and of its feeder, its label; of a guidepath and a carriage that of the
+            robot.
+        paint: colour of a part, `#rrggbb`.
+    """
 
     style: str
     points: tuple[Point2, ...]
@@ -55,15 +64,18 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
         yield part_outline(layout, leaf.label, layout.guidepaths[0].a, "product")
     for leaf in leaves:
         feeder = feeder_of(layout, leaf.label)
-        yield Flat.of_box("boom", feeder.boom)
-        yield Flat.of_box("post", feeder.post)
-        yield Flat.of_box("housing", feeder.housing)
-    for path in layout.guidepaths:
+        for style, box in (
+            ("boom", feeder.boom),
+            ("post", feeder.post),
+            ("housing", feeder.housing),
+        ):
+            yield replace(Flat.of_box(style, box), name=leaf.label)
+    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
         stop = path.carriage(path.reach)
         turns = [*map(path.corner, reversed(path.corners))]
         for leg in pairwise([path.carriage(path.length), *turns, stop]):
-            yield Flat("path", leg)
-        yield Flat("last", (stop, path.a))
+            yield Flat("path", leg, name=robot.name)
+        yield Flat("last", (stop, path.a), name=robot.name)
     for robot in layout.factory.robots:
         yield from _robot(layout, robot.index, "tool" if robot.type == "tool" else "dot")
     for leaf in leaves:
@@ -116,7 +128,8 @@ def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
         yield Flat.of_box("finger", path.world(box, foot))
     arm: Extent = (0.0, rim, -ARM_WIDTH / 2, ARM_WIDTH / 2)
     yield Flat.of_box("arm", path.world(arm, foot))
-    yield Flat.of_box(style, path.world((-half, half, -half, half), foot))
+    carriage = Flat.of_box(style, path.world((-half, half, -half, half), foot))
+    yield replace(carriage, name=layout.factory.robots[robot].name)
 
 
 def _is_round(solid: Solid) -> bool:

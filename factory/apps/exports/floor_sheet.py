@@ -76,35 +76,59 @@ TILES = ".tile { fill: #eef1f4; stroke: #9aa5b1; stroke-width: 3; }\n"
 
 def write_svg(layout: Layout) -> str:
     """The floor plan: guidepaths, robots at home, junctions, feeders, outfeed, payload sweeps."""
-    return _Sheet(layout).text()
+    return FloorSheet(layout).text()
 
 
-class _Sheet:
+def draw_floor(layout: Layout, ruler: float) -> tuple[str, Box]:
+    """The floor alone, to stand beside others at one scale: without words, with a scale bar of at
+    most so many millimetres (`ruler`); and the bounds of its page [mm]."""
+    return FloorSheet(layout).plain(ruler)
+
+
+class FloorSheet:
     """Draws the sheet. The sizes around the floor are multiples of `unit` [mm]; a floor that is
-    tall (`upright`) has the legend on its right, any other below."""
+    tall (`upright`) has the legend on its right, any other below. Words are outside of `reach`, the
+    floor and all that is drawn beside it."""
 
     def __init__(self, layout: Layout) -> None:
         self.layout, self.canvas = layout, Canvas()
-        self.floor = page_box(layout.floor)
+        self.floor = self.reach = page_box(layout.floor)
         self.wide, self.tall = self.floor[1] - self.floor[0], self.floor[3] - self.floor[2]
         self.unit = max(14.0, sqrt(self.wide * self.tall) / 45, self.wide / 60)
         self.upright = self.tall > 1.5 * self.wide
 
-    def text(self) -> str:
-        """The document."""
+    def plain(self, ruler: float) -> tuple[str, Box]:
+        """The document without words, and its bounds."""
+        self._shapes()
+        (left, right, top, bottom), size = self.floor, ruler / 12
+        self.canvas.scale_bar((left + size, bottom + 1.2 * size), ruler, size)
+        page = left - RIM / 2, right + RIM / 2, top - RIM / 2, bottom + 3 * size
+        return self.canvas.document(f"{self._name()}: floor", page, self._style()), page
+
+    def _shapes(self) -> None:
         shapes = list(flat_shapes(self.layout))
         for name, styles in GROUPS.items():
             with self.canvas.group(id=name):
                 for shape in shapes:
                     if shape.style in styles:
                         self._draw(shape)
+
+    def _style(self) -> str:
+        return STYLE + TILES if self.layout.tile else STYLE
+
+    def _paint(self, shape: Flat) -> str:
+        """The style in which a shape is drawn."""
+        return shape.style
+
+    def text(self) -> str:
+        """The document."""
+        self._shapes()
         with self.canvas.group(id="labels"):
             self._labels()
         with self.canvas.group(id="sheet"):
             page = self._around()
         scale = min(max(1500 / (page[1] - page[0]), 0.25), 1.5)
-        style = STYLE + TILES if self.layout.tile else STYLE
-        return self.canvas.document(f"{self._name()}: floor plan", page, style, scale)
+        return self.canvas.document(f"{self._name()}: floor plan", page, self._style(), scale)
 
     def _name(self) -> str:
         pag = self.layout.factory.pag
@@ -115,6 +139,7 @@ class _Sheet:
 
     def _draw(self, shape: Flat) -> None:
         """A shape in its style; a part in its colour, with its name as a tooltip."""
+        style = self._paint(shape)
         points = [millimetres(point) for point in shape.points]
         xs, ys = zip(*points, strict=True)
         reach = 1e3 * shape.radius
@@ -123,19 +148,19 @@ class _Sheet:
             self.canvas.block(around)
         more = {"title": shape.name, "fill": shape.paint if shape.style == "part" else None}
         if shape.box:
-            self.canvas.rectangle(around, shape.style, 8.0 * (shape.style in ("dot", "tool")))
+            self.canvas.rectangle(around, style, 8.0 * (shape.style in ("dot", "tool")))
             if shape.style == "floor":
                 self._grid()
             elif shape.style == "belt":
                 self._chevrons(around)
         elif shape.radius:
-            self.canvas.circle(points[0], reach, shape.style, **more)
+            self.canvas.circle(points[0], reach, style, **more)
         elif len(points) == 2:
-            self.canvas.line(shape.style, *points)
+            self.canvas.line(style, *points)
             if shape.style == "path":
                 self._arrows(points[0], points[1])
         else:
-            self.canvas.polygon(points, shape.style, **more)
+            self.canvas.polygon(points, style, **more)
 
     def _grid(self) -> None:
         """Lines each tenth of a metre, or half on a large floor; labels keep inside the floor."""
@@ -191,21 +216,15 @@ class _Sheet:
 
     def _around(self) -> Box:
         """Draw title, figures, dimensions, scale bar and legend; returns the bounds of the page."""
-        unit, (left, right, top, bottom) = self.unit, self.floor
-        layout, title = self.layout, self._name()
-        figures = (
-            f"{len(layout.guidepaths)} robots, {len(layout.factory.leaves)} parts, floor"
-            f" {layout.area:.2f} m²",
-            f"guidepaths {layout.guidepath_length:.2f} m, clearance {layout.clearance * 1e3:g} mm",
-        )
+        unit, (left, right, top, bottom) = self.unit, self.reach
+        title, figures = self._name(), self._figures()
         longest = max(*(0.8 * len(words) for words in figures), 1.5 * 1.15 * len(title)) * LETTER
         edge = max(right + (17 if self.upright else 1) * unit, left + (longest + 1) * unit)
         self.canvas.text((left, top - 4.7 * unit), title, 1.5 * unit, "h")
         for number, words in enumerate(figures):
             self.canvas.text((left, top - (2.7 - 1.3 * number) * unit), words, 0.8 * unit)
         self._dimensions()
-        types = {robot.type for robot in layout.factory.robots}
-        entries = [entry for entry in LEGEND if entry[0] != "tool" or "tool" in types]
+        entries = self._legend()
         below = bottom + (3.2 if self.upright else 5.6) * unit
         if self.upright:
             x = right + 1.5 * unit
@@ -216,10 +235,24 @@ class _Sheet:
             below = self.canvas.legend(entries, (left, below), edge, unit)
         return left - 3.2 * unit, edge, top - 7.2 * unit, below
 
+    def _figures(self) -> tuple[str, str]:
+        """Two lines below the title."""
+        layout = self.layout
+        return (
+            f"{len(layout.guidepaths)} robots, {len(layout.factory.leaves)} parts, floor"
+            f" {layout.area:.2f} m²",
+            f"guidepaths {layout.guidepath_length:.2f} m, clearance {layout.clearance * 1e3:g} mm",
+        )
+
+    def _legend(self) -> list[tuple[str, str]]:
+        """Styles with what they stand for."""
+        types = {robot.type for robot in self.layout.factory.robots}
+        return [entry for entry in LEGEND if entry[0] != "tool" or "tool" in types]
+
     def _dimensions(self) -> None:
         """The floor's width below it and its depth to its left."""
         unit, tick, (left, right, top, bottom) = self.unit, 0.25 * self.unit, self.floor
-        y, x, size = bottom + 0.9 * unit, left - 0.9 * unit, 0.7 * unit
+        y, x, size = self.reach[3] + 0.9 * unit, self.reach[0] - 0.9 * unit, 0.7 * unit
         self.canvas.line("line", (left, y), (right, y))
         self.canvas.line("line", (x, top), (x, bottom))
         for end in (left, right):

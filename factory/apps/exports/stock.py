@@ -53,6 +53,7 @@ def written(model: Model) -> Model:
         section[:] = sorted(map(_position, section), key=_turn)
     _mask_what_is_fed(root)
     _add_sensors(root)
+    add(add(root, "keyframe"), "key", name="home")
     ElementTree.indent(root)
     return replace(model, xml=ElementTree.tostring(root, encoding="unicode") + "\n")
 

@@ -31,9 +31,15 @@ Source = Project | GearNet | MarkedNet | Log
 
 @dataclass(frozen=True)
 class Subject:
-    """Source and options of an export. `file`: the file that was read; `of`: the value of `--of`,
-    "" for the default; `name`: name of the file to write; `whole`: whether to write a folder with
-    everything."""
+    """Source and options of an export.
+
+    Attributes:
+        file: the file that was read.
+        source: what was read from it: a project, a net or a log.
+        of: the value of `--of`, "" for the default.
+        name: name of the file to write.
+        whole: whether to write a folder with everything.
+    """
 
     file: Path
     source: Source = field(repr=False)

@@ -79,6 +79,7 @@ class Estimator:
     refused: set[tuple[str, int]] = field(default_factory=set, compare=False)
     bare: bool = False
     _alone: dict[tuple[int, ...], Project] = field(default_factory=dict, compare=False)
+    _known: dict[object, tuple[dict[str, int], float]] = field(default_factory=dict, compare=False)
 
     @cached_property
     def tasks(self) -> tuple[FormsTask, ...]:
@@ -139,8 +140,10 @@ class Estimator:
         before: Mapping[str, int] = {}
         for bound in self.bounds(order, robots):
             for _ in range(ROUNDS):
+                if budget.over(share):
+                    return
                 forms, _ = self._best(order, bound, frozenset(self.refused))
-                if forms == before or budget.over(share):
+                if forms == before:
                     break
                 budget.spend()
                 one, before = self.candidate(forms), forms
@@ -186,11 +189,13 @@ class Estimator:
     ) -> tuple[dict[str, int], float]:
         """The best forms of the joins of all products, those of what is common as the first product
         has them; and the sum of estimated cycles above a bound [s]."""
-        refused |= self._alike
-        tasks = (replace(task, order=order, refused=refused) for task in self.tasks)
-        best = [best_forms(task, bound) for task in tasks]
-        chosen = {x: pile for piles, _ in reversed(best) for x, pile in piles.items()}
-        return chosen, sum(over for _, over in best)
+        key = order, bound, refused
+        if key not in self._known:
+            tasks = (replace(t, order=order, refused=refused | self._alike) for t in self.tasks)
+            best = [best_forms(task, bound) for task in tasks]
+            chosen = {x: pile for piles, _ in reversed(best) for x, pile in piles.items()}
+            self._known[key] = chosen, sum(over for _, over in best)
+        return self._known[key]
 
     def _filled(self, one: Candidate, robots: float) -> Iterator[Estimate]:
         """The estimates of a candidate with one robot for each label, and with lines for each
@@ -200,12 +205,12 @@ class Estimator:
         large = len(shift.timing.factory.making) >= LARGE
         if shift.count(()) <= robots:
             yield Estimate(shift.count(()), shift.seconds(()), forms)
-        for filling in shift.fillings(FILLED, SLACKS[:1] if large else SLACKS):
-            lines = shift.lines(filling)
+        for filling, lines in shift.filled(FILLED, SLACKS[:1] if large else SLACKS, large):
+            if not lines or lines in tried:
+                continue
+            tried.add(lines)
             count = shift.count(lines)
-            wanted = robots == inf or FEWER * robots <= count <= robots
-            if lines and lines not in tried and wanted:
-                tried.add(lines)
+            if robots == inf or FEWER * robots <= count <= robots:
                 yield Estimate(count, shift.seconds(lines), forms, filling)
 
     def _shift(self, project: Project) -> Shift:

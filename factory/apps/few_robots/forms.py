@@ -7,7 +7,7 @@ the other axis than they would to a robot that brings it to a third.
 
 The forms chosen are optimal in a lexicographic order, for instance fewest blocked operations, then
 no estimated cycle above a bound, then fewest robots: exact for these estimates. Cycles are
-estimated from the sizes of sub-assemblies; layouts decide (`study/allocation/search.py`).
+estimated from the sizes of sub-assemblies; layouts decide (`search.py`).
 """
 
 from __future__ import annotations

@@ -80,6 +80,24 @@ class Shift:
                 yield Filling(limit, slack, onward=True)
             limit *= step
 
+    def filled(
+        self, step: float, slacks: Sequence[float] = SLACKS, briefly: bool = False
+    ) -> Iterator[tuple[Filling, tuple[Line, ...]]]:
+        """The `fillings` to try, each with its lines; `briefly`: limits no greater than the first
+        that gives the lines of no limit at all."""
+        unlimited, settled = dict[Filling, tuple[Line, ...]](), set[Filling]()
+        for filling in self.fillings(step, slacks):
+            without = replace(filling, limit=inf)
+            if without in settled:
+                continue
+            lines = self.lines(filling)
+            yield filling, lines
+            if briefly:
+                if without not in unlimited:
+                    unlimited[without] = self.lines(without)
+                if lines == unlimited[without]:
+                    settled.add(without)
+
     def lines(self, filling: Filling) -> tuple[Line, ...]:
         """The lines for a filling. Robots of a mix are on one line where their tours for some
         product are."""

@@ -24,7 +24,7 @@ from factory.apps.analyze.measured import operation_times
 from factory.apps.analyze.timed import steady_units
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.fidelity.record import QUANTITIES, Fidelity, SeedRecord
-from factory.apps.sweep.pool import over_processes
+from factory.apps.sweep.workers import over_workers
 from factory.engine.mjcf.model import product_name
 
 WORST = 10
@@ -56,12 +56,13 @@ def measure(
     jobs: int = 1,
     done: Callable[[int], None] | None = None,
     max_time: float | None = None,
+    on: str | None = None,
 ) -> Fidelity:
     """Compare the worlds over `seeds`. With `jobs` > 1 so many processes share the seeds (a script
-    then needs `if __name__ == "__main__"`); the figures are the same. `done` is called with the
-    number of finished seeds."""
+    then needs `if __name__ == "__main__"`), or the workers of a Dask scheduler whose address is
+    given (`on`); the figures are the same. `done` is called with the number of finished seeds."""
     case = Case(layout, units, jitter, settings or Settings(), max_time)
-    records = over_cases([(case, seed) for seed in seeds], jobs, done)
+    records = over_cases([(case, seed) for seed in seeds], jobs, done, on)
     factory = layout.factory
     return Fidelity(product_name(factory), len(factory.robots), jitter, tuple(records))
 
@@ -70,22 +71,25 @@ def over_cases(
     work: Sequence[tuple[Case, int]],
     jobs: int = 1,
     done: Callable[[int], None] | None = None,
+    on: str | None = None,
 ) -> list[SeedRecord]:
     """`measure_seed` of every case and seed, in their order."""
     records: dict[int, SeedRecord] = {}
-    for number, record in _worked(work, jobs):
+    for number, record in _worked(work, jobs, on):
         records[number] = record
         if done is not None:
             done(len(records))
     return [records[number] for number in range(len(work))]
 
 
-def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, SeedRecord]]:
-    if min(jobs, len(work)) <= 1:
+def _worked(
+    work: Sequence[tuple[Case, int]], jobs: int, on: str | None
+) -> Iterator[tuple[int, SeedRecord]]:
+    if on is None and min(jobs, len(work)) <= 1:
         for number, (case, seed) in enumerate(work):
             yield number, measure_seed(case, seed)
         return
-    with closing(over_processes(_measured, work, jobs)) as results:
+    with closing(over_workers(_measured, work, jobs, on=on)) as results:
         for worked in results:
             if worked.result is None:
                 seed = work[worked.number][1]

@@ -11,8 +11,8 @@ from factory.api import HIDDEN, Array, MonitorSubject, Operation, Simulation, na
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
-from factory.apps.report.page import counts, filled, options
-from factory.apps.report.scene import DrawnFactory, Pack, scene, stations
+from factory.apps.report.page import counts, filled, options, paints
+from factory.apps.report.scene import DrawnFactory, Pack, drawn, scene, stations
 from factory.apps.report.sections import assembly_tree
 
 SCRIPTS = (
@@ -59,6 +59,7 @@ def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
         "tree": assembly_tree(factory.pag, labels),
         "floor": floor_plan(stage, labels),
         "net": net_drawing(factory, stage.roles),
+        "paints": paints(stage),
         "speeds": "".join(
             f'<option value="{s:g}"{" selected" * (s == 1)}>{f"{s:g}×" if s else "max"}</option>'
             for s in SPEEDS
@@ -76,6 +77,8 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
     the world."""
     layout, world = simulation.layout, simulation.physical
     m, d, factory, (at, _) = world.m, world.d, layout.factory, world.motion.axes.measured(world.d)
+    model = simulation.model
+    assert model is not None
     low, high = d.xpos.copy(), d.xpos.copy()
     for robot in factory.robots:
         body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
@@ -92,6 +95,7 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
         np.stack([low, high]),
         MonitorSubject.of_run(simulation).as_json()["places"],
         stations(factory, m, _ends(simulation)),
+        drawn(m, model.xml, model.files),
     )
 
 

@@ -9,10 +9,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from factory.api import Observer, Project, RunRequest, Simulation, Timing, steady_from, write_pag
 from factory.apps.analyze.timed import steady_units
+from factory.apps.drawing.tables import titled
 from factory.apps.few_robots.aim import Least
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
@@ -53,6 +54,16 @@ def point_files(front: ParetoFront, folder: Path) -> dict[Path, bytes]:
         files |= plan_files(point.project, folder / point_name(number), text, laid)
     return files | {folder / path: content for path, content in store.files.items()}
 
+
+Ended = Literal["complete", "effort", "seconds", "stopped"]
+"""Whether all that is promising was laid out, or what ended the search before."""
+
+ENDINGS: dict[Ended, str] = {
+    "complete": "",
+    "effort": "the search used up its effort after {}; a greater --effort may find more",
+    "seconds": "the search ran out of time after {}; more --seconds may find more",
+    "stopped": "the search was stopped by hand after {}",
+}
 
 SEED, JITTER = 0, 0.3
 """Seed and jitter of the robots' speeds and gains."""
@@ -234,8 +245,7 @@ def undominated(points: Iterable[FrontPoint]) -> list[FrontPoint]:
 class ParetoFront:
     """The Pareto front found for a product: `points` in the order of their robots; the `least`
     number of robots that can make it; the numbers of factories `estimated` and `laid_out`; the
-    product as `written` as a point, None where it has no layout; whether the sweep is
-    `complete`."""
+    product as `written` as a point, None where it has no layout; how the sweep `ended`."""
 
     name: str
     points: tuple[FrontPoint, ...]
@@ -243,7 +253,26 @@ class ParetoFront:
     written: FrontPoint | None = None
     estimated: int = 0
     laid_out: int = 0
-    complete: bool = True
+    ended: Ended = "complete"
+
+    def __repr__(self) -> str:
+        ends = " to ".join(str(point) for point in (self.points[0], self.points[-1]))
+        return f"<ParetoFront of {self.name}: {len(self.points)} points, {ends}>"
+
+    def _repr_html_(self) -> str:
+        rows = (
+            (p.robots, p.tools, p.seconds, p.area, p.trial.measured if p.trial else None)
+            for p in self.points
+        )
+        columns = ("robots", "tools", "cycle [s]", "floor [m²]", "measured, with jitter [s]")
+        return titled(repr(self), columns, rows)
+
+    @property
+    def ending(self) -> str:
+        """Why the sweep ended before all that is promising was laid out, in words; "" where it did
+        not."""
+        made = f"{self.laid_out} layouts" if self.laid_out else f"{self.estimated} estimates"
+        return ENDINGS[self.ended].format(made)
 
     @property
     def work(self) -> float | None:
@@ -295,7 +324,8 @@ class ParetoFront:
             "bound": self.work,
             "estimated": self.estimated,
             "laid_out": self.laid_out,
-            "complete": self.complete,
+            "complete": self.ended == "complete",
+            "ended": self.ended,
         }
 
 

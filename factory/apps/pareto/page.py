@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from factory.apps.exports.floor_sheet import write_svg
+from factory.api import Layout
+from factory.apps.drawing.canvas import Box, page_box
+from factory.apps.drawing.tables import alike, differing, table
+from factory.apps.exports.floor_sheet import draw_floor, write_svg
 from factory.apps.pareto.chart import cycle_chart, floor_chart
 from factory.apps.pareto.front import JITTER, SEED, FrontPoint, ParetoFront, point_name
 from factory.apps.report.page import filled
 
 PLAN_NAME = "floor.svg"
+
+TALLEST = 0.8
+"""Greatest height of a floor plan, over the width of its panel."""
 
 STYLES = ("report/report.css", "pareto/pareto.css")
 
@@ -40,17 +46,12 @@ def floor_plans(front: ParetoFront, folder: Path) -> dict[Path, bytes]:
     }
 
 
-def front_page(
-    front: ParetoFront, commands: Sequence[str], plans: Mapping[Path, bytes], folder: Path
-) -> str:
-    """The text of the page: `commands` build the points, `plans` are their floor plans by the paths
-    that `floor_plans` gives them in the same folder."""
-    pictures = [plans.get(folder / point_name(n) / PLAN_NAME) for n in range(len(front.points))]
+def front_page(front: ParetoFront, commands: Sequence[str]) -> str:
+    """The text of the page; `commands` build the points."""
+    pictures = _pictures(front)
     points = "".join(
-        _point(point_name(number), point, command, picture)
-        for number, (point, command, picture) in enumerate(
-            zip(front.points, commands, pictures, strict=True)
-        )
+        _point(point_name(number), point, command, pictures.get(number, ""))
+        for number, (point, command) in enumerate(zip(front.points, commands, strict=True))
     )
     floors = front.points and front.points[0].area is not None
     fields = {
@@ -102,35 +103,40 @@ def _cards(front: ParetoFront) -> list[str]:
 
 
 def _ending(front: ParetoFront) -> str:
-    words = [escape(front.unproved)] * bool(front.unproved)
-    if not front.complete:
-        words.append("The search is incomplete: it ran out of time or was stopped.")
-    return "".join(f'<p class="notice" role="note">{one}</p>' for one in words)
+    words = [escape(one) for one in (front.ending, front.unproved) if one]
+    return "".join(f'<p class="notice" role="note">{w[0].upper()}{w[1:]}.</p>' for w in words)
 
 
 def _table(front: ParetoFront) -> str:
-    rows = "".join(
-        f"<tr{_judged(point)}>{_row(point_name(n), point)}</tr>"
-        for n, point in enumerate(front.points)
-    )
+    made = [
+        (_judged(point), _cells(f'<a class="link" href="#{name}">{name}</a>', point))
+        for name, point in ((point_name(n), p) for n, p in enumerate(front.points))
+    ]
     if front.written is not None:
-        rows += f'<tr class="own">{_row("", front.written)}</tr>'
-    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+        made.append((' class="own"', _cells("as written", front.written)))
+    every = [cells for _, cells in made]
+    shown = differing(every)
+    rows = "".join(
+        f"<tr{style}><th>{cells[0]}</th>{''.join(f'<td>{cells[n]}</td>' for n in shown if n)}</tr>"
+        for style, cells in made
+    )
+    same = alike(COLUMNS, every)
+    note = f'<p class="note">The same for all: {same}.</p>' if same else ""
+    return table([COLUMNS[n] for n in shown], rows) + note
 
 
 def _judged(point: FrontPoint) -> str:
     return ' class="bad"' if point.trial is not None and not point.trial.holds else ""
 
 
-def _row(name: str, point: FrontPoint) -> str:
-    """The cells of a point; one without a name is the product as it is written."""
+def _cells(name: str, point: FrontPoint) -> tuple[str, ...]:
     trial = point.trial
-    cells = (
+    return (
+        name,
         str(point.robots),
-        str(point.tools or "–"),
-        str(len(point.lines) or "–"),
-        str(point.relays or "–"),
+        str(point.tools or "none"),
+        str(len(point.lines) or "none"),
+        str(point.relays or "none"),
         _figure(point.seconds, "s"),
         _figure(point.bound, "s"),
         _figure(point.area, "m²"),
@@ -142,21 +148,38 @@ def _row(name: str, point: FrontPoint) -> str:
         if trial.error is None
         else f"{100 * trial.error:+.1f} %",
     )
-    first = f'<a class="link" href="#{name}">{name}</a>' if name else "as written"
-    return f"<th>{first}</th>" + "".join(f"<td>{cell}</td>" for cell in cells)
 
 
 def _figure(value: float | None, unit: str) -> str:
     return "–" if value is None else f"{value:.2f} {unit}"
 
 
-def _point(name: str, point: FrontPoint, command: str, plan: bytes | None) -> str:
+def _pictures(front: ParetoFront) -> dict[int, str]:
+    """The floors of points that have a layout, by number, all at one scale."""
+    layouts = {n: p.project.layout for n, p in enumerate(front.points) if p.predicted is not None}
+    ruler = max((right - left for left, right, *_ in map(_box, layouts.values())), default=0.0) / 4
+    drawn = {number: draw_floor(layout, ruler) for number, layout in layouts.items()}
+    sizes = [(right - left, bottom - top) for _, (left, right, top, bottom) in drawn.values()]
+    wide, tall = (max(sides) for sides in zip(*sizes, strict=True)) if sizes else (1.0, 1.0)
+    whole, pictures = max(wide, tall / TALLEST), dict[int, str]()
+    for (number, (text, _)), (width, _) in zip(drawn.items(), sizes, strict=True):
+        data = b64encode(text.encode()).decode()
+        alt = f"Floor plan of {point_name(number)}: {front.points[number]}"
+        pictures[number] = (
+            f'<div class="plan" style="aspect-ratio:{whole / tall:.4f}">'
+            f'<img alt="{alt}" style="width:{100 * width / whole:.2f}%"'
+            f' src="data:image/svg+xml;base64,{data}"></div>'
+        )
+    return pictures
+
+
+def _box(layout: Layout) -> Box:
+    return page_box(layout.floor)
+
+
+def _point(name: str, point: FrontPoint, command: str, picture: str) -> str:
     """A panel: what the point is, its floor plan, its lines and its command."""
-    words, picture = str(point), ""
-    if plan is not None:
-        data = b64encode(plan).decode()
-        alt = f"Floor plan of {name}: {words}"
-        picture = f'<img class="plan" alt="{alt}" src="data:image/svg+xml;base64,{data}">'
+    words = str(point)
     return (
         f'<section class="panel" id="{name}" aria-labelledby="h-{name}"><div class="bar">'
         f'<h2 id="h-{name}">{name}</h2><span class="note">{words}</span></div>{picture}'

@@ -23,7 +23,7 @@ from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate, Estimator
 from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.search import SINGLE, Search
-from factory.apps.pareto.front import FrontPoint, ParetoFront, candidates_front, undominated
+from factory.apps.pareto.front import Ended, FrontPoint, ParetoFront, candidates_front, undominated
 from factory.theory.problem.plan import THIRD
 
 WIDE = 2
@@ -97,7 +97,8 @@ class FrontSweep:
         self.written: FrontPoint | None = None
         self.points: list[FrontPoint] = []
         self.estimates: list[Estimate] = []
-        self.laid_out, self.complete = 0, False
+        self.laid_out = 0
+        self.ended: Ended = "stopped"
 
     @cached_property
     def troubles(self) -> int:
@@ -115,7 +116,7 @@ class FrontSweep:
             self.written,
             len(self.estimates),
             self.laid_out,
-            self.complete,
+            self.ended,
         )
 
     def look(self) -> None:
@@ -129,7 +130,8 @@ class FrontSweep:
             whole = self._lay_out() and self._relay() and whole
             if not self.points:
                 self.project.layout  # noqa: B018 (says why there is none)
-        self.complete = whole
+        late = self.budget.spent < self.budget.effort and self.budget.time_used >= 1
+        self.ended = "complete" if whole else "seconds" if late else "effort"
 
     def _estimate(self) -> bool:
         """Estimate the sweep, then the best with one form changed; whether the sweep is

@@ -1,7 +1,7 @@
 """Directional blocking graphs: which parts block which along each axis, and which touch.
 
 A part i that leaves along +axis past j, both in the finished product, is *blocked* by j as `check`
-would find (`compiler/mating/`): with the same bodies, depths and tolerance. The pairs of an axis
+would find (`floor/mating/`): with the same bodies, depths and tolerance. The pairs of an axis
 are a directional blocking graph (Wilson and Latombe, *Geometric Reasoning about Mechanical
 Assembly*, 1994) for an infinite translation, so a part that is free in it can be removed
 completely. The graph of the opposite direction is its transpose.

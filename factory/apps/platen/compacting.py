@@ -44,8 +44,9 @@ PRESS = 0.3, 40.0
 BEYOND = 1.0
 """A guidepath that ends across its heading has its second corner so much further [m]."""
 
-HEAT = 0.1
-"""So much worse a layout may be to go on from, as a share of the floor, at first."""
+INITIAL_TEMPERATURE = 0.1
+"""Temperature of the simulated annealing at first: by how much worse a layout may be to go on from,
+as a share of the floor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,7 @@ class _Search:
             under = self.under[robot]
             there = here.changed(robot, self.proposed(robot, here.bends.get(robot)), under)
             now = self.worth(here, size) + press * here.deep.sum()
-            limit = now + HEAT * (1 - share) ** 2 * self.rng.exponential()
+            limit = now + INITIAL_TEMPERATURE * (1 - share) ** 2 * self.rng.exponential()
             if self.worth(there, size) > limit:
                 continue
             there.look(under)

@@ -57,8 +57,8 @@ class DrivenSupervisor:
 
     @property
     def refusals(self) -> list[Refusal]:
-        """All commands that were refused."""
-        return self.interlock.refusals
+        """The last commands that were refused."""
+        return list(self.interlock.refusals.last)
 
     @property
     def marked(self) -> bytearray:
@@ -104,9 +104,17 @@ class DrivenSupervisor:
         outfeed = any(map(interlock.ready, factory.dropoffs))
         return Sensed(interlock.world.time, *interlock.world.sense(), held, (*leaves, outfeed))
 
+    def corridor(self) -> tuple[Array, Array]:
+        """The lowest and the highest place that each axis may go to now (n,) [m]."""
+        interlock = self.interlock
+        low, high = interlock.corridors.bounds(
+            interlock.marked, interlock.fired, interlock.world.sense()[0], self.drives.stops
+        )
+        return low, np.maximum(low, high)
+
     def refuse(self, message: str) -> None:
         """Refuse what concerns no single robot."""
-        self.refusals.append(Refusal(self.interlock.world.time, NOBODY, message))
+        self.interlock.refusals.add(Refusal(self.interlock.world.time, NOBODY, message))
 
     @property
     def scans(self) -> Sequence[Scan]:
@@ -120,7 +128,7 @@ class DrivenSupervisor:
         self._trip()
         self.interlock.carry_out(commands)
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
-        target = self._confined(commands, stops)
+        target = self._confined(commands)
         for axis, where in enumerate(target.tolist()):
             stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
             drives.target[axis] = stops[axis] if stands else where
@@ -136,13 +144,9 @@ class DrivenSupervisor:
             self.tripped = True
             self.refuse(f"{why}: all axes stand until the plant is started anew")
 
-    def _confined(self, commands: Commands, stops: Array) -> Array:
+    def _confined(self, commands: Commands) -> Array:
         """The targets in their corridors; those that are not are refused once."""
-        interlock = self.interlock
-        low, high = interlock.corridors.bounds(
-            interlock.marked, interlock.fired, interlock.world.sense()[0], stops
-        )
-        high = np.maximum(low, high)
+        interlock, (low, high) = self.interlock, self.corridor()
         confined = np.clip(commands.target, low, high)
         astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
         for axis in sorted(astray - self._astray):
@@ -150,7 +154,7 @@ class DrivenSupervisor:
             name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
             ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
             message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
-            self.refusals.append(Refusal(interlock.world.time, robot, message))
+            self.interlock.refusals.add(Refusal(interlock.world.time, robot, message))
         self._astray = astray
         return confined
 

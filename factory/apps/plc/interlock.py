@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import NOPART, Event, Layout, Mode, Operation, World
+from factory.api import NOPART, Event, Layout, Mode, Operation, Truth, World
 from factory.apps.plc.corridors import Corridors
-from factory.apps.plc.signals import Commands, GripStates, Refusal
+from factory.apps.plc.signals import Commands, GripStates, Refusal, Refusals
 from factory.engine.simulation.ordering import Ordering
 from factory.floor.layout.coordinating import Coordinated
 from factory.theory.control.mode import REST
@@ -24,7 +24,7 @@ class PlantInterlock:
     """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
     X_e when it gives it up. `net`: the coordinated net of the layout; `corridors`: where axes may
     go; `fired`: firing counts of the transitions; `held_back`: robots that stand because their last
-    command is refused; `refusals`: all refused commands."""
+    command is refused; `refusals`: the refused commands."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class PlantInterlock:
         self.threads = Threads(gears.threaded, gears.threads_of(gears.initial_marking), starts)
         self.fired = [0] * len(gears.threaded.transitions)
         self.events: list[Event] = []
-        self.refusals: list[Refusal] = []
+        self.refusals = Refusals()
         robots = len(layout.factory.robots)
         self.grips, self.held_back = GripStates(robots), set[int]()
         self.commands = Commands(world.sense()[0].copy(), (False,) * robots, (0,) * robots)
@@ -108,12 +108,12 @@ class PlantInterlock:
             if not self.marked[operation.place]:
                 what = f"{name} takes up {_name(operation)} before its carrier does"
                 self._refuse(robot, what)
-        elif why := self._obstacle(operation):
+        elif why := self.obstacle(operation):
             self._refuse(robot, f"{name} takes up {_name(operation)}, but {why}")
         else:
             self._fire(operation, operation.start)
 
-    def _obstacle(self, operation: Operation) -> str:
+    def obstacle(self, operation: Operation) -> str:
         """Why an operation cannot start; "" if it can."""
         if operation.start not in self.threads.possible:
             places = self.factory.net.threaded.net.preset[operation.start]
@@ -145,16 +145,49 @@ class PlantInterlock:
             self._refuse(robot, what)
         if robot != operation.carrier or not self.marked[operation.place]:
             return
-        after = operation.after[operation.robots.index(robot)]
-        held = self.held(robot)
-        if held != (after != NOPART):
-            state = "is closed" if held else "is open"
-            self._refuse(robot, f"{name} ends {_name(operation)}, but its grip {state}")
-        elif far := self._far(operation) or self._moving(operation):
-            self._refuse(robot, f"{name} ends {_name(operation)}, but {far}")
+        if why := self.unfinished(operation):
+            self._refuse(robot, f"{name} ends {_name(operation)}, but {why}")
         else:
             self._fire(operation, operation.end)
             self.grips.hand_over(operation)
+
+    def unfinished(self, operation: Operation) -> str:
+        """Why an operation cannot end; "" if it can."""
+        robot = operation.carrier
+        held = self.held(robot)
+        if held != (operation.after[operation.robots.index(robot)] != NOPART):
+            return f"its grip {'is closed' if held else 'is open'}"
+        return self._far(operation) or self._moving(operation)
+
+    def legal_jobs(self) -> Truth:
+        """Which jobs each robot may have in the next commands, 0 for none (robots, operations + 1):
+        the one that it has, and those that it may take up now. One that is at work has no other
+        before it may give its own up."""
+        factory, jobs = self.factory, self.commands.job
+        legal = np.zeros((len(factory.robots), len(factory.operations) + 1), bool)
+        for robot, job in enumerate(jobs):
+            operation = self._operation(job)
+            legal[robot, job if operation else 0] = True
+            if operation is not None:
+                works = self.marked[operation.place] and robot in operation.robots
+                leads = works and robot == operation.carrier
+                closed = robot in self.grips.closed
+                legal[robot, 0] = not closed and not (
+                    self.unfinished(operation) if leads else works
+                )
+        for operation in factory.operations:
+            if self.marked[operation.place]:
+                takers = [robot for robot in operation.robots if robot != operation.carrier]
+            else:
+                takers = (
+                    []
+                    if jobs[operation.carrier] or self.obstacle(operation)
+                    else [operation.carrier]
+                )
+            for robot in takers:
+                if not jobs[robot] and robot not in self.grips.closed:
+                    legal[robot, operation.index + 1] = True
+        return legal
 
     def _fire(self, operation: Operation, transition: int) -> None:
         job = operation, self.factory.unit(operation, self.fired[transition])
@@ -223,7 +256,7 @@ class PlantInterlock:
 
     def _refuse(self, robot: int, message: str) -> None:
         """Refuse a command: the robot stands until its job or grip command changes."""
-        self.refusals.append(Refusal(self.world.time, robot, message))
+        self.refusals.add(Refusal(self.world.time, robot, message))
         self.held_back.add(robot)
 
 

@@ -74,7 +74,7 @@ class OpcuaPlant:
 
     @property
     def refusals(self) -> Sequence[Refusal]:
-        """All commands that were refused."""
+        """The last commands that were refused."""
         return self._plant.refusals
 
     def __enter__(self) -> OpcuaPlant:
@@ -206,8 +206,9 @@ class OpcuaPlant:
     async def _tell(self, sensed: Sensed, stop: bool) -> None:
         """Events, refusals, and from time to time the axes."""
         plant, sent = self._plant, self._told
-        events, refusals = plant.events[sent[0] :], plant.refusals[sent[1] :]
-        self._told = [sent[0] + len(events), sent[1] + len(refusals)]
+        refused = plant.interlock.refusals
+        events, refusals = plant.events[sent[0] :], refused.since(sent[1])
+        self._told = [sent[0] + len(events), refused.count]
         for message in (*(e.transition for e in events), *(r.message for r in refusals)):
             await self._server.tell(self._nodes["event"], message)
         if refusals:

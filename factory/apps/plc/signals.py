@@ -3,6 +3,7 @@ targets, grips with a sensor each."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -53,6 +54,34 @@ class Refusal:
     time: float
     robot: int
     message: str
+
+
+KEPT = 1000
+"""The most refusals that are kept."""
+
+
+class Refusals:
+    """The refused commands of a plant, of which the last KEPT are kept: a controller that asks for
+    what is refused for days fills no memory.
+
+    Attributes:
+        count: the number of all refusals.
+        last: the last ones, the newest at the end.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.last = deque[Refusal](maxlen=KEPT)
+
+    def add(self, refusal: Refusal) -> None:
+        """Keep a refusal, in place of the oldest if there are too many."""
+        self.count += 1
+        self.last.append(refusal)
+
+    def since(self, count: int) -> list[Refusal]:
+        """The refusals after the first `count` ones, as far as they are kept."""
+        new = min(self.count - count, len(self.last))
+        return list(self.last)[len(self.last) - new :]
 
 
 class AxisDrives:

@@ -9,7 +9,7 @@ from factory.api import NOPART, Factory, Marking, Operation
 from factory.engine.simulation.supervisor import Supervisor
 
 
-class Books:
+class RunState:
     """Reads the state of a factory from a supervisor's marking, or from another marking."""
 
     def __init__(self, factory: Factory, supervisor: Supervisor) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 
 from factory.api import NOPART, Operation, Simulation
 from factory.apps.deviations.deviation import Deviation
-from factory.apps.recovery.books import Books
+from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
 from factory.engine.simulation.ideal import IdealWorld
 
@@ -14,7 +14,7 @@ from factory.engine.simulation.ideal import IdealWorld
 class IdealPlant(Plant):
     """The faults of an ideal world: a part is where its robot is, or lost; sensors never err."""
 
-    def __init__(self, simulation: Simulation, books: Books) -> None:
+    def __init__(self, simulation: Simulation, books: RunState) -> None:
         self._simulation, self._books = simulation, books
         self._gone: set[int] = set()
         self._slipped: dict[int, float] = {}

@@ -24,9 +24,9 @@ from factory.api import (
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import KINDS, Deviation
 from factory.apps.deviations.injector import FaultInjector, Hit
-from factory.apps.recovery.books import Books
+from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
-from factory.apps.recovery.responding import Responding
+from factory.apps.recovery.responding import RecoveryPolicy
 from factory.apps.recovery.standing import patience
 from factory.engine.record.failures import Stood
 from factory.engine.simulation.supervisor import Supervisor
@@ -92,14 +92,17 @@ def _unseen(failures: Failures, hits: Sequence[Hit]) -> Iterator[str]:
 
 
 class Recovery:
-    """The detection of failures in a simulation and the responses; see `recover`. `pending`:
-    operations at their goals that have failed a test, with the name of the test."""
+    """The detection of failures in a simulation and the responses; see `recover`.
 
-    def __init__(self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign):
+    Attributes:
+        pending: by operation (index) at its goal that has failed a test, the name of the test.
+    """
+
+    def __init__(self, simulation: Simulation, books: RunState, plant: Plant, campaign: Campaign):
         self.simulation, self.books, self.plant = simulation, books, plant
         self.injector = FaultInjector(simulation, campaign, plant)
         self.condition = self.injector.condition
-        self.responding = Responding(simulation, books, plant, campaign)
+        self.responding = RecoveryPolicy(simulation, books, plant, campaign)
         self.condition.limit = self.responding.standing.limit
         self.pending: dict[int, str] = {}
         self._campaign = campaign
@@ -271,7 +274,7 @@ def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery
     if not isinstance(supervisor, Supervisor):
         message = "robots that run their own programs do not recover"
         raise InputError(Diagnostic("BadFault", message, None, "leave out --distributed"))
-    books = Books(simulation.layout.factory, supervisor)
+    books = RunState(simulation.layout.factory, supervisor)
     plant: Plant
     if simulation.model is None:
         from factory.apps.recovery.ideal import IdealPlant

@@ -10,12 +10,12 @@ import numpy as np
 
 from factory.api import NOPART, Diagnostic, Failing, Marking, Operation, Simulation, Undone
 from factory.apps.deviations.campaign import Campaign
-from factory.apps.recovery.books import Books
+from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
-from factory.apps.recovery.returning import Goal, Returning, WayBack, order_of
-from factory.apps.recovery.standing import Standing
+from factory.apps.recovery.returning import Goal, ReturnMotion, WayBack, order_of
+from factory.apps.recovery.standing import MotionHold
 from factory.apps.recovery.undo import marking_after, undo
-from factory.apps.recovery.wasting import OnEnd, Wasting
+from factory.apps.recovery.wasting import OnEnd, ScrapRouting
 from factory.floor.layout.scrapping import not_carried_back
 
 SCRAPS = 20
@@ -25,13 +25,20 @@ BINNED = 1.0
 """What falls into a bin is gone so long after that [s]."""
 
 
-class Responding:
-    """`found`: all failures. `dead`: for each robot (index) known to be dead the time of its
-    replacement [s], inf without a spare. `returning`, `standing`: robots that return, and that
-    stand."""
+class RecoveryPolicy:
+    """Responds to detected failures as the templates say.
+
+    Attributes:
+        found: all failures.
+        dead: by robot (index) known to be dead, the time of its replacement [s]; inf without a
+            spare.
+        used_spares: number of spares that replaced a robot.
+        returning: the motion of robots that return.
+        standing: the robots that are stopped.
+    """
 
     def __init__(
-        self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign
+        self, simulation: Simulation, books: RunState, plant: Plant, campaign: Campaign
     ) -> None:
         self._simulation, self._books, self._plant, self._campaign = (
             simulation,
@@ -40,13 +47,13 @@ class Responding:
             campaign,
         )
         eps = simulation.request.settings.eps
-        self.returning = Returning(simulation.layout, books.supervisor, eps)
-        self.standing = Standing(simulation, books.supervisor)
+        self.returning = ReturnMotion(simulation.layout, books.supervisor, eps)
+        self.standing = MotionHold(simulation, books.supervisor)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
         self.used_spares = 0
         self._on_end = OnEnd()
-        self._wasting = Wasting(not_carried_back(simulation.layout))
+        self._wasting = ScrapRouting(not_carried_back(simulation.layout))
 
     def passed(self, operation: Operation) -> None:
         """Note that an operation has passed its tests."""

@@ -31,9 +31,16 @@ PAST = 2e-3
 
 @dataclass(slots=True)
 class WayBack:
-    """The return of a robot: it goes to its `goals` in turn, starting when the robots in `after`
-    have returned and `ready` holds; then `done` is called. `stage`: the number of its current mode;
-    `since` [s]: since when it could have moved."""
+    """The return of a robot.
+
+    Attributes:
+        goals: where it goes, one after another.
+        after: robots (index) that must have returned before it sets out.
+        done: called when it has returned.
+        ready: whether it may set out.
+        stage: the number of its current mode; -1 before the first.
+        since: since when it could have moved [s].
+    """
 
     goals: list[Goal]
     after: frozenset[int] = frozenset()
@@ -43,8 +50,12 @@ class WayBack:
     since: float = np.inf
 
 
-class Returning:
-    """The robots (index) that are returning: `ways`."""
+class ReturnMotion:
+    """Moves robots back to where they wait in the marking after an undo.
+
+    Attributes:
+        ways: by robot (index) that is returning, its way back.
+    """
 
     def __init__(self, layout: Layout, supervisor: Supervisor, eps: float) -> None:
         self._layout, self._supervisor = layout, supervisor

@@ -27,9 +27,12 @@ def patience(seconds: float) -> float:
     return SLUGGISH * seconds + GRACE
 
 
-class Standing:
-    """Stops robots (index) of a simulation by their speed limits. `stood`: for each change of the
-    robots that stand, the time and which."""
+class MotionHold:
+    """Stops robots (index) of a simulation by their speed limits.
+
+    Attributes:
+        stood: for each change of the robots that stand, the time [s] and their names.
+    """
 
     def __init__(self, simulation: Simulation, supervisor: Supervisor) -> None:
         self._simulation, self._limits = simulation, simulation.limits

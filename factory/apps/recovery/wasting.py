@@ -28,9 +28,13 @@ class OnEnd:
 
 
 @dataclass(slots=True)
-class Wasting:
-    """`held`: the label of the scrap that each robot (index) holds; `barred`: pairs (robot, label)
-    that the robot cannot carry back to B."""
+class ScrapRouting:
+    """Decides where robots put their scrap.
+
+    Attributes:
+        barred: pairs (robot, label) that the robot cannot carry back to B.
+        held: by robot (index), the label of the scrap that it holds.
+    """
 
     barred: frozenset[tuple[int, str]]
     held: dict[int, str] = field(default_factory=dict)

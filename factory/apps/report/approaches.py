@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 
 from factory.api import Operation, Product
+from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.mating import AMPLE, UPRIGHT
@@ -37,12 +38,18 @@ def approaches_section(recording: Recording, labels: Mapping[str, int]) -> str:
         return ""
     chosen = {o.label: _taken(recording, o) for o in operations}
     room = _rooms(recording, chosen)
-    rows = "".join(_row(o, chosen[o.label], room.get(o.label), labels) for o in operations)
-    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    made = [_cells(o, chosen[o.label], room.get(o.label), labels) for o in operations]
+    shown = [0, *(n for n in differing(made) if n > 0)]
+    rows = "".join(
+        f"<tr{_mark(chosen[o.label])}>{''.join(f'<td>{cells[n]}</td>' for n in shown)}</tr>"
+        for o, cells in zip(operations, made, strict=True)
+    )
+    same, listed = alike(COLUMNS, made), table([COLUMNS[n] for n in shown], rows)
+    note = f"<p class='note'>In all of them: {same}.</p>" if same else ""
     return (
         '\n<section class="panel wide approaches" aria-labelledby="h-approaches">\n'
         '<div class="bar"><h2 id="h-approaches">How parts come together</h2></div>'
-        f'<div class="text"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        f'<div class="text"><div class="scroll">{listed}</div>{note}'
         f"<p class='note'>{LEGEND}</p></div>\n</section>"
     )
 
@@ -65,16 +72,19 @@ def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str,
     return rooms(nodes_of(recording.factory), recording.layout.product, chosen)
 
 
-def _row(o: Operation, approach: Approach, room: float | None, labels: Mapping[str, int]) -> str:
+def _cells(
+    o: Operation, approach: Approach, room: float | None, labels: Mapping[str, int]
+) -> tuple[str, ...]:
     pairs = {overlap.parts for side in approach.overlaps for overlap in side}
     name, number = escape(o.label), labels.get(o.label)
     if number is not None:
         name = f'<button class="link" data-label="{number}">{name}</button>'
-    bad = ' class="bad"' if approach.kind == "blocked" else ""
-    return (
-        f"<tr{bad}><td>{name}</td><td>{escape(' + '.join(o.inputs))}</td>"
-        f"<td>{escape(approach.told)}</td><td>{_room(room)}</td><td>{_left_out(pairs)}</td></tr>"
-    )
+    joined = escape(" + ".join(o.inputs))
+    return name, joined, escape(approach.told), _room(room), _left_out(pairs)
+
+
+def _mark(approach: Approach) -> str:
+    return ' class="bad"' if approach.kind == "blocked" else ""
 
 
 def _room(room: float | None) -> str:

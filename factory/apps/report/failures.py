@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Any
 
 from factory.api import Failing, Failures
+from factory.apps.drawing.tables import table
 from factory.apps.report.recording import Recording
 from factory.engine.record.failures import Death, deaths
 from factory.theory.lang.source import counted
@@ -25,10 +26,9 @@ def failures_section(recording: Recording) -> str:
     failures = recording.log.failures
     if failures is None:
         return ""
-    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     rows = "".join(_row(recording, one) for one in failures.found)
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
-    text = f"<p>{escape(_summary(failures))}</p>{table}<p class='note'>{LEGEND}</p>"
+    listed = table(COLUMNS, rows) if rows else ""
+    text = f"<p>{escape(_summary(failures))}</p>{listed}<p class='note'>{LEGEND}</p>"
     return (
         '\n<section class="panel wide failures" aria-labelledby="h-failures">\n'
         '<div class="bar"><h2 id="h-failures">Failures</h2></div>'

@@ -21,7 +21,7 @@ from factory.apps.report.failures import failures_data, failures_section
 from factory.apps.report.frames import frames
 from factory.apps.report.pace import fidelity, measured, predicted
 from factory.apps.report.recording import Recording, recording_of
-from factory.apps.report.scene import Pack, scene
+from factory.apps.report.scene import DrawnFactory, Pack, scene
 from factory.apps.report.sections import (
     assembly_tree,
     ending,
@@ -82,6 +82,7 @@ def page(recording: Recording) -> str:
         "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
         "net": net_drawing(recording.factory, recording.stage.roles),
+        "paints": paints(recording.stage),
         "approaches": approaches_section(recording, labels),
         "failures": failures_section(recording),
         "pace": pace(recording, run, plan),
@@ -98,6 +99,11 @@ def page(recording: Recording) -> str:
         script, style = FAILURES
         scripts, styles = (*SCRIPTS[:-1], script, SCRIPTS[-1]), (*STYLES, style)
     return filled("report/report.html", fields, document, pack.text(), scripts, styles)
+
+
+def paints(stage: DrawnFactory) -> str:
+    """The colours of roles as properties of a style sheet."""
+    return f":root {{ {' '.join(f'--paint-{k}: {v};' for k, v in stage.paints.items())} }}\n"
 
 
 def counts(factory: Factory) -> str:

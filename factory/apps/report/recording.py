@@ -28,7 +28,7 @@ from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.log import Log, read_log
 from factory.apps.log.project_table import factory_of, project_of
 from factory.apps.monitor.record import verdict_on, watch_log
-from factory.apps.report.scene import DrawnFactory, stations
+from factory.apps.report.scene import DrawnFactory, drawn, stations
 from factory.apps.resume.remade import forged, model_faults
 
 
@@ -93,6 +93,7 @@ class Recording:
             np.stack([seen.position.min(axis=0), seen.position.max(axis=0)]),
             self.log.header["monitor"]["places"],
             stations(self.factory, m, self._ends()),
+            drawn(m, self.log.xml, self.log.files),
         )
 
     def _ends(self) -> Iterator[tuple[Operation, Array]]:

@@ -9,15 +9,26 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
+from math import atan2, degrees
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array, Factory, Geoms, Operation, Replica, mujoco, names, rotation
+from factory.apps.drawing.canvas import hexadecimal
 from factory.apps.exports.geoms import triangles
-from factory.engine.mjcf.robots import ROLES
+from factory.film.dress import dressed
 from factory.floor.geometry.pieces import joined
+
+VIEW = (-0.62, -1.0, 0.78)
+"""Where the camera stands, seen from the factory."""
+
+ROLE = "role/"
+"""What the names of the materials of robots begin with, by what these do."""
+
+PLAIN = 0.0, 0.4
+"""Metallic share and roughness of what has no material."""
 
 
 class Pack:
@@ -49,6 +60,7 @@ class DrawnFactory:
     that is not over, to the world; `reach` (2, bodies, 3): the least and the greatest position;
     `places`: where the body of each part is in the finished product [m]; `stations`: where the
     payload is held as operations of several robots end (x, y) [m], each with the labels they make.
+    `drawn`: the same in which what it is made of is seen, with the same bodies.
     """
 
     factory: Factory
@@ -58,20 +70,39 @@ class DrawnFactory:
     reach: Array = field(repr=False)
     places: Mapping[str, Iterable[float]] = field(repr=False)
     stations: Mapping[tuple[float, float], list[str]] = field(repr=False)
+    drawn: mujoco.MjModel = field(repr=False)
 
     @cached_property
     def roles(self) -> tuple[str, ...]:
         """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
         m = self.m
-        paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
+        paints = dict(enumerate(self._paints(m)))
         by_robot = []
         for robot in self.factory.robots:
             body = m.body(names.carriage(robot.name))
             first = int(body.geomadr[0])
             worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
-            roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
-            by_robot.append(next(roles, "shared"))
+            by_robot.append(next(filter(None, map(paints.get, worn)), "shared"))
         return tuple(by_robot)
+
+    @property
+    def paints(self) -> dict[str, str]:
+        """The colours of roles, as `#rrggbb`, which are those of the robots in 3-D."""
+        m = self.drawn
+        return {role: hexadecimal(m.mat(i).rgba) for i, role in enumerate(self._paints(m)) if role}
+
+    @staticmethod
+    def _paints(m: mujoco.MjModel) -> list[str]:
+        """The role that each material of a model is for; "" for any other."""
+        every = (m.mat(i).name for i in range(m.nmat))
+        return [name.removeprefix(ROLE) if name.startswith(ROLE) else "" for name in every]
+
+
+def drawn(m: mujoco.MjModel, xml: str, files: Mapping[str, bytes]) -> mujoco.MjModel:
+    """The drawn model of a run's model `m`, whose MJCF and mesh files these are; what is written on
+    it is read from where the camera stands."""
+    text = dressed(xml, m, degrees(atan2(VIEW[1], VIEW[0])))
+    return mujoco.MjModel.from_xml_string(text, dict(files))
 
 
 def stations(
@@ -98,24 +129,35 @@ def placed(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
 
 def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
     """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
-    (n, 3) from 0 to 255; and how opaque it is."""
+    (n, 3) and metallic share and roughness (n, 2) from 0 to 255; and how opaque it is."""
     meshes = [placed(m, geom) for geom in geoms]
     paints = np.array([Geoms(m).colour(geom) for geom in geoms])
     counts = [len(points) for points, _ in meshes]
     vertices, faces = joined(meshes)
-    colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
+    finishes = np.array([_finish(m, int(m.geom_matid[geom])) for geom in geoms])
+    values = np.round(255 * np.clip(np.hstack([paints[:, :3], finishes]), 0, 1)).astype(np.uint8)
+    corners = np.repeat(values, counts, axis=0)
     made = [
         vertices.astype(np.float32),
         faces.astype(np.uint32),
-        np.repeat(colours, counts, axis=0),
+        corners[:, :3],
+        corners[:, 3:],
     ]
     return made, float(paints[:, 3].min())
+
+
+def _finish(m: mujoco.MjModel, material: int) -> tuple[float, float]:
+    """The metallic share and the roughness of a material; what it does not say is that of none."""
+    if material < 0:
+        return PLAIN
+    metallic, rough = float(m.mat_metallic[material]), float(m.mat_roughness[material])
+    return (metallic if metallic >= 0 else PLAIN[0]), (rough if rough >= 0 else PLAIN[1])
 
 
 def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
     """The geometry, into the pack, and the list of things: each a shape, the body it moves with,
     and what it stands for (`robot` or `label`, by number)."""
-    m = stage.m
+    m = stage.drawn
     robots = {robot.name: robot.index for robot in stage.factory.robots}
     shapes: dict[bytes, int] = {}
     alphas: list[float] = []
@@ -126,11 +168,12 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
         if key not in shapes:
             shapes[key] = number = len(shapes)
             alphas.append(round(alpha, 3))
-            for letter, values in zip("vfc", made, strict=True):
+            for letter, values in zip("vfcm", made, strict=True):
                 pack.add(f"{letter}{number}", values)
         name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
         things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})
-    return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
+    places = _places(stage, labels)
+    return {"alphas": alphas, "things": things, "places": places, "view": VIEW}
 
 
 def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:

@@ -7,6 +7,7 @@ from html import escape
 from math import comb
 
 from factory.api import PAG, CutOff, Diagnostic, Factory, steady_from
+from factory.apps.drawing.tables import table
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.report.drawings import words_of
 from factory.apps.report.pace import MeasuredPace, Predicted, excluded
@@ -25,7 +26,7 @@ def ending(cut: CutOff | None) -> str:
     if cut is None:
         return ""
     words = escape(cut.with_cause, quote=True)
-    return f'<p class="notice" role="note">{words[0].upper()}{words[1:]}.</p>'
+    return f'<p class="notice bad" role="note">{words[0].upper()}{words[1:]}.</p>'
 
 
 def heading(
@@ -39,15 +40,15 @@ def heading(
     units = int(recording.log.header["units"])
     products = f"in {recording.end:.2f} s of simulated time"
     cards = [("Products", f"{len(run.dropoffs)} <small>of {units}</small>", products)]
+    if cycle := run.cycle or (plan and plan.cycle):
+        foretold = f", predicted {plan.cycle:.3f} s" if plan else ""
+        how = f"measured{foretold}" if run.cycle else "predicted"
+        hourly = f"{_figure(_per_hour(cycle))} products an hour"
+        cards.append(("Cycle time", f"{cycle:.3f} <small>s</small>", f"{how}; {hourly}"))
     if plan is not None:
-        hourly = f"{_figure(_per_hour(plan.cycle))} products an hour"
-        cards.append(("Cycle time", f"{plan.cycle:.3f} <small>s</small>", f"predicted; {hourly}"))
         names = escape(", ".join(plan.critical[:3]))
         note = f"measured: gear of {robots[run.critical].name}" if run.dropoffs else "predicted"
         cards.append(("Sets the pace", names, note))
-    elif run.cycle:
-        hourly = f"{_figure(_per_hour(run.cycle))} products an hour"
-        cards.append(("Cycle time", f"{run.cycle:.3f} <small>s</small>", f"measured; {hourly}"))
     cards.append(("Net", *_verdict(proof.holds, "proved", "not proved"), "live, safe, reversible"))
     held, monitor = recording.verdict.follows, recording.monitor
     judge = "record only" if monitor is None else "record and monitor agree"
@@ -63,7 +64,9 @@ def heading(
         wrong = "bodies differ" if follows else "does not follow the net"
         cards.append(("Run", *_verdict(held, "follows the net", wrong), judge))
     if doubts := recording.verdict.qualified:
-        cards.append(("But", f"{len(doubts)} <small>reservations</small>", "; ".join(doubts)))
+        noun = f"reservation{'s' * (len(doubts) > 1)}"
+        value = f'<span class="doubt">{len(doubts)} <small>{noun}</small></span>'
+        cards.append(("But", value, "; ".join(doubts)))
     return "".join(_card(*card) for card in cards)
 
 
@@ -101,11 +104,11 @@ def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str
     names = ("", "predicted", "measured", "error", "")
     note = ""
     if plan is None:
-        note = f'<p class="note">No prediction: {escape(recording.missing)}.</p>'
+        note = f'<p class="doubt">No prediction: {escape(recording.missing)}.</p>'
     elif run.cycle is None:
         least = steady_from(recording.factory.period)
         note = f'<p class="note">A cycle time is measured from {least} products on.</p>'
-    return _table(names, body) + note + _gears(recording, run, plan)
+    return table(names, body) + note + _gears(recording, run, plan)
 
 
 def _gears(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
@@ -222,8 +225,8 @@ def fidelity_words(recording: Recording, figures: Mapping[str, float | None]) ->
         f"<td>{escape(QUANTITIES[key].unit)}</td></tr>"
         for key, value in figures.items()
     )
-    table = _table(("", "measured", "limit", ""), rows)
-    return "".join(_judged(recording)) + _excluded(recording) + table
+    figures_table = table(("", "measured", "limit", ""), rows)
+    return "".join(_judged(recording)) + _excluded(recording) + figures_table
 
 
 def _excluded(recording: Recording) -> str:
@@ -273,7 +276,7 @@ def _listed(failures: Sequence[Diagnostic]) -> Iterator[str]:
 
 def _title(key: str) -> str:
     """The key of a figure as words, without its unit."""
-    for unit in ("_mm", "_s"):
+    for unit in ("_mm", "_s", "_deg"):
         key = key.removesuffix(unit)
     return key.replace("_", " ").capitalize()
 
@@ -297,11 +300,6 @@ def made_how(recording: Recording) -> str:
     return f"<dl>{body}</dl>"
 
 
-def _table(columns: tuple[str, ...], rows: str) -> str:
-    head = "".join(f"<th>{name}</th>" for name in columns)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-
-
 def _figure(value: float | None) -> str:
     if value is None:
         return "–"
@@ -318,4 +316,5 @@ def _shown(value: float | None) -> str:
 def _error(predicted: float | None, measured: float | None) -> str:
     if not predicted or not measured:
         return ""
-    return f"{100 * (predicted / measured - 1):+.1f} %"
+    error = round(100 * (predicted / measured - 1), 1)
+    return f"{error:+.1f} %" if error else "0.0 %"

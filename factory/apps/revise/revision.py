@@ -31,6 +31,7 @@ from factory.apps.revise.matching import matching, shifted
 from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
+from factory.apps.revise.revision_picture import draw_revision
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.mating.mating import judged
 
@@ -66,6 +67,20 @@ class Revision:
             )
             for robot, other in pairing.robots.items()
         )
+
+    def __repr__(self) -> str:
+        whole = sum(one.whole for one in self.kept)
+        counts = f"{whole} as they were, {len(self.added)} new, {len(self.gone)} gone"
+        return f"<Revision {self.title}: {len(self.kept)} robots stay, {counts}>"
+
+    def _repr_svg_(self) -> str:
+        return self.drawing
+
+    @property
+    def drawing(self) -> str:
+        """What stays, on the floor plan of the new factory, as SVG."""
+        layouts = self.old.layout, self.new.layout
+        return draw_revision(self.title, layouts, self.kept, self.inheritance.shift)
 
     @property
     def gone(self) -> list[str]:

@@ -17,20 +17,20 @@ APART = (
     (
         "--relay",
         ("--robots", "--parallel", "[lines]"),
-        "a relay cuts the way of one tour, and a robot has several then",
+        "a relay divides the way of one tour, and such a robot has several tours",
     ),
     ("[tees]", ("--robots", "--cycle", "--relay"), "they change the robots that share a stem"),
     (
         "--demand",
         ("--distributed", "--from"),
-        "one supervisor skips what nobody has ordered, from the beginning on",
+        "only a central supervisor that starts at the beginning can skip units without orders",
     ),
     (
         "--distributed",
         ("--faults", "--spares"),
         "robots that run their own programs do not recover",
     ),
-    ("--platen", ("--relay", "--cycle"), "what they change has no room on guidepaths that bend"),
+    ("--platen", ("--relay", "--cycle"), "relays need straight guidepaths"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""
@@ -47,15 +47,27 @@ def check_together(values: Mapping[str, bool]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """How a run is made: in a `world`, until so many `units` are dropped off; `seed` and `jitter`
-    draw each robot's speed and gain within ± jitter. `wip`: most copies of each part inside;
-    `start`: a legal marking, or the names of its places, separated by commas, m_0 where None;
-    `fuse`: whether parts joined for good become one body, None where that pays; `max_time`: at most
-    so long [simulated s]; `distributed`: robots run their own programs; `lenient`: what its bodies
-    do does not count; `faults`: a file of what goes wrong, `spares`: robots in reserve, `swap`: how
-    long an exchange takes [s]; `demand`: a file of the orders for a mix, or a seed that draws them;
-    `strict`: a run fails whose success is qualified. Raises InputError (Usage) with every value out
-    of its bounds."""
+    """The options of a run.
+
+    Attributes:
+        world: the world.
+        units: number of units to make.
+        seed: seed of all random draws.
+        jitter: each robot's speed and gain are drawn within ± this share.
+        wip: most copies of each part inside; None for no bound.
+        start: a legal marking, or the names of its places, separated by commas; None for m₀.
+        fuse: whether parts joined for good become one body; None for where that pays.
+        max_time: simulated time after which the run is stopped [s].
+        distributed: whether robots run their own programs.
+        lenient: whether the verdict on its bodies is left out.
+        faults: a file of deviations.
+        spares: number of spare robots.
+        swap: time to replace a dead robot [s].
+        demand: a file of the orders for a mix, or a seed that draws them.
+        strict: whether a run fails whose success is qualified.
+
+    Raises InputError (Usage) with every value out of its bounds.
+    """
 
     world: WorldName = "mujoco"
     units: int = 1

@@ -3,6 +3,8 @@ them."""
 
 from __future__ import annotations
 
+from base64 import b64encode
+from pathlib import Path
 from typing import NamedTuple
 
 from factory.api import Project, Recorder, Run, Shot, Simulation
@@ -25,10 +27,26 @@ def render_log(log: Log, shot: Shot) -> int:
 
 
 class Rendered(NamedTuple):
-    """The number of frames, and the run that was made for them, None for a log."""
+    """The number of frames, the run that was made for them, None for a log, and the file."""
 
     frames: int
     run: Run | None
+    file: Path
+
+    def __repr__(self) -> str:
+        what = "a still" if self.frames == 1 else f"a film of {self.frames} frames"
+        return f"<Rendered: {what}, {self.file}>"
+
+    def _repr_mimebundle_(self, **_: object) -> dict[str, object]:
+        """The still itself, or the film with buttons."""
+        words: dict[str, object] = {"text/plain": repr(self)}
+        if not self.file.is_file():
+            return words
+        data = b64encode(self.file.read_bytes()).decode()
+        if self.file.suffix.lower() == ".png":
+            return {**words, "image/png": data}
+        source = f"data:video/mp4;base64,{data}"
+        return {**words, "text/html": f'<video controls width="100%" src="{source}"></video>'}
 
 
 def render(
@@ -42,7 +60,7 @@ def render(
     at its time. Raises InputError, MissingError without GL, StoppedError as `carry_out`."""
     probe()
     if isinstance(source, Log):
-        return Rendered(render_log(source, shot), None)
+        return Rendered(render_log(source, shot), None, shot.output)
     made = Simulation(source.layout, asked.request(source))
     taken: list[Film] = []
 
@@ -53,4 +71,4 @@ def render(
 
     enough = shot.at if shot.is_still and shot.at != "end" else asked.max_time
     run = carry_out(made, silent, enough, [opened], watched, progress=progress)
-    return Rendered(taken[0].frames if taken else 1, run)
+    return Rendered(taken[0].frames if taken else 1, run, shot.output)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
+from factory.apps.drawing.tables import titled
 from factory.apps.sweep.grid import Value
 from factory.apps.sweep.store import reading
 from factory.apps.sweep.work import FAILING_FIGURES, FIGURES
@@ -75,6 +76,12 @@ class Group:
         """The statistic of each figure, after all runs are added."""
         return {key: statistic(self.columns[key]) for key in SUMMED if key in self.columns}
 
+    @property
+    def pace(self) -> tuple[float | None, float | None]:
+        """The mean of the cycle time and its standard deviation [s], where it was measured."""
+        cycle = self.figures.get(FIRST[0])
+        return (cycle.mean, cycle.deviation) if cycle else (None, None)
+
     def as_json(self) -> dict[str, Any]:
         """Under the keys of `sweep --summary --json`."""
         figures = {key: asdict(statistic) for key, statistic in self.figures.items()}
@@ -92,6 +99,21 @@ class Summary:
     varied: tuple[str, ...]
     groups: tuple[Group, ...]
     reasons: Mapping[str, int]
+
+    def __repr__(self) -> str:
+        varied = ", ".join(self.varied)
+        counts = f"{self.done} runs done, {self.failed} failed"
+        groups = f"{len(self.groups)} group{'s' * (len(self.groups) != 1)}"
+        return f"<Summary of {self.product}: {counts}; {groups}, varied: {varied}>"
+
+    def _repr_html_(self) -> str:
+        names = [key for key, _ in self.groups[0].values] if self.groups else []
+        rows = (
+            (*(value for _, value in group.values), group.done, group.failed, *group.pace)
+            for group in self.groups
+        )
+        figures = ("done", "failed", "cycle time [s]", "deviation [s]")
+        return titled(repr(self), (*names, *figures), rows)
 
     @property
     def done(self) -> int:

@@ -11,10 +11,10 @@ from typing import Any
 
 from factory.api import InputError
 from factory.apps.sweep.grid import Axis, Point, check_value, points
-from factory.apps.sweep.pool import over_processes
 from factory.apps.sweep.recipe import Recipe, name_of
 from factory.apps.sweep.store import Store
 from factory.apps.sweep.work import Outcome, Runner, failed
+from factory.apps.sweep.workers import over_workers
 from factory.support.interruption import Interruption
 from factory.support.progress import StepBar
 
@@ -86,9 +86,10 @@ def sweep(
     jobs: int = 1,
     retry: bool = False,
     quiet: bool = True,
+    on: str | None = None,
 ) -> Tally:
     """Run every point of a grid without a row in the database; with `retry`, also those that
-    failed, in `jobs` processes.
+    failed, in `jobs` processes or `on` the Dask scheduler at an address.
 
     After KeyboardInterrupt, or if this process is killed, all rows stay, and the same call resumes.
     Raises InputError if a fixed value is out of range (BadValue), or if the database holds another
@@ -109,7 +110,7 @@ def sweep(
         begin = perf_counter()
         with (
             StepBar("running", quiet) as bar,
-            closing(run_local(recipe, wanted, jobs)) as outcomes,
+            closing(outcomes_of(recipe, wanted, jobs, on)) as outcomes,
         ):
             for outcome in outcomes:
                 with Interruption() as interruption:
@@ -121,13 +122,18 @@ def sweep(
     return tally
 
 
-def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
-    """The outcomes of all points as they come, from `jobs` processes. Closing the iterator ends the
-    processes. Raises RunError if processes die as they start."""
-    with closing(over_processes(Runner(recipe), points, jobs, dict.fromkeys(THREADS, "1"))) as done:
+def outcomes_of(
+    recipe: Recipe, points: Sequence[Point], jobs: int, on: str | None = None
+) -> Outcomes:
+    """The outcomes of all points as they come, from `jobs` processes, or `on` a scheduler. Closing
+    the iterator ends the work. Raises RunError if processes die as they start, or the scheduler is
+    lost."""
+    variables = dict.fromkeys(THREADS, "1")
+    with closing(over_workers(Runner(recipe), points, jobs, variables, on)) as done:
         for run in done:
             if run.result is None:
-                reason = f"Killed the process died in {run.tries} tries (exit status {run.status})"
+                status = f" (exit status {run.status})" if run.status is not None else ""
+                reason = f"Killed the process died in {run.tries} tries{status}"
                 yield failed(points[run.number], reason, run.tries)
             else:
                 yield replace(run.result, tries=run.tries)

@@ -65,11 +65,21 @@ SETTLED = 0.7
 
 @dataclass(frozen=True, slots=True)
 class DrivenAxis:
-    """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
-    changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
-    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it; `held`: what it must
-    push against untold [N]; `room`: how far its end stops may let it go [m]; `motor`: the axis of
-    the robot type, None of a station."""
+    """What a drive moves, and how.
+
+    Attributes:
+        own: mass that moves without a load [kg].
+        load: mass of the load [kg].
+        acceleration: its acceleration, which changes by up to twice its amount, times `jump`,
+            at once [m/s²].
+        push: the acceleration that its force is for [m/s²].
+        stiffness: its stiffness [rad/s].
+        gain: the least gain that jitter draws for it.
+        jump: see `acceleration`.
+        held: force against which it must push untold [N].
+        room: how far its end stops may let it go [m].
+        motor: the axis of the robot type; None of a station.
+    """
 
     own: float
     load: float

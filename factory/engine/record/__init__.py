@@ -1,1 +1,1 @@
-"""What is recorded of a run: its log, and the monitor that judges it from its states."""
+"""The record of a run: its states, figures and failures, and the verdict on it."""

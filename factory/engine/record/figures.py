@@ -11,19 +11,39 @@ from factory.theory.plant.approaches import Pair
 
 @dataclass(frozen=True, slots=True)
 class PhysicsFigures:
-    """What only the engine can tell; see the specification of `run` for each.
+    """Figures of a run that only the engine can tell.
 
-    `product_angle_max_deg`: how far any part of a product was turned against its first one,
-    `misplaced`: the label of the one that was out of place most;
-    `handoff_angle_max_deg`: the same of the frames that a grip joined as it closed;
-    `joining_error_max_mm`: how far any vertex of a part was from its place as a grip closed on it,
-    before welds pulled: `product_error_max_mm` is what is left of that. `mating_forces`: by
-    operation, the largest force of a contact between inputs that it was joining [N]; `pairs`: how
-    many pairs of parts there are; `excluded`: those whose contact was off; `timestep_chosen`: by
-    the factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
-    chose one; `contact_first_s`: when the first unintended contact began, `dropped_s`: when a load
-    was dropped [s]; `faults`: what was not as it should be of the engine's model; `reservations`:
-    what a run of this model does not show, in words.
+    Attributes:
+        handoffs: number of parts that changed hands.
+        handoff_gap_max_mm: largest distance of the frames that a weld joined as it closed [mm].
+        handoff_angle_max_deg: largest angle between them [°].
+        joining_error_max_mm: largest displacement of a vertex of a part from its place as a
+            weld closed on it, before that pulled [mm]; `product_error_max_mm` is what is left
+            of it.
+        weld_residual_max_mm: largest position error of a closed weld [mm].
+        product_error_max_mm: largest displacement of a part in a finished product [mm]; None
+            before the first.
+        product_angle_max_deg: largest angle of a part against the first of its product [°].
+        misplaced: the label of the part that was out of place most.
+        unintended_contacts: number of contacts that were not meant.
+        contacts: the pairs that touched so, by name.
+        contact_first_s: time of the first [s].
+        engine_warnings: number of the engine's warnings.
+        mating_forces: by operation, the largest force of a contact between inputs that it
+            joined [N].
+        pairs: number of pairs of parts.
+        excluded: the pairs whose contact was off.
+        fused: whether joined parts became one body.
+        timestep_s: the timestep [s].
+        timestep_chosen: whether it was chosen by the factory.
+        wip_chosen: the bound on units inside at once where the factory chose one.
+        grip_gap_max_mm: largest distance between the pads of a holder and its payload [mm].
+        grip_strength_share_max: largest share of a hand's strength that its load used.
+        grip_strength_robot: the robot of that hand.
+        grip_strength_label: what it held.
+        dropped_s: time when a load was dropped [s].
+        faults: what of the engine's model was not as it should be.
+        reservations: what a run of this model does not show, in words.
     """
 
     handoffs: int = 0

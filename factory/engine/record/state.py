@@ -165,10 +165,16 @@ class RecordedRequest(Protocol):
 class Recordable(Protocol):
     """A run that can be recorded, such as `simulation.Simulation`.
 
-    `asked`: the request before anything was chosen for it; `start`: the marking the run begins
-    from; `word`: which units are made; `model` and the `engine`'s: None in the ideal world.
-    Observers in `at_ends` are shown the state in which operations have ended and parts have changed
-    hands, before the engine continues.
+    Attributes:
+        layout: the layout.
+        asked: the request before anything was chosen for it.
+        request: the request as it runs.
+        start: the marking in which it begins.
+        word: which units are made.
+        model: the MJCF model; None in the ideal world.
+        engine: the engine's model; None in the ideal world.
+        at_ends: observers that are shown the state in which operations have ended and parts
+            have changed hands, before the engine continues.
     """
 
     @property

@@ -23,9 +23,16 @@ SHOWN = 4
 
 @dataclass(frozen=True, slots=True)
 class FigureLimit:
-    """Upper bound on a figure of the bodies in a run that succeeds; `code` and `words`: the
-    failure, with the figure in place of `{}`. `names`: the figure that lists the bodies concerned;
-    `at`: the figure with the time [s]."""
+    """Upper bound on a figure of the bodies in a run that succeeds.
+
+    Attributes:
+        code: code of the failure.
+        figure: name of the figure.
+        most: its bound, in the unit of the figure.
+        words: the failure, with the figure in place of `{}`.
+        names: the figure that lists the bodies concerned, "" for none.
+        at: the figure with the time [s], "" for none.
+    """
 
     code: str
     figure: str

@@ -11,9 +11,15 @@ from factory.theory.plant.factory import Factory
 
 
 class Ahead:
-    """The stages of waiting robots, numbered after the operations. For each stage: the operation
-    that it is `of`, and the one that it comes `after`; its `place` and the operation that it
-    `follows`; the stage that comes `then`."""
+    """The stages of waiting robots, numbered after the operations: the moves of `HeadStart`.
+
+    Attributes:
+        of: by operation (index), its stages.
+        after: by operation (index), the stages that begin when it has ended.
+        place: by stage, the place in which the robot waits.
+        follows: by stage, the operation (index) before it.
+        then: by stage, the one that comes next.
+    """
 
     def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
         count = len(factory.operations)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.simulation.run import STEADY, Run, steady_from
 from factory.support.console import POOL_BOUND
+from factory.support.progress import paced
 
 
 def not_tested(physics: PhysicsFigures) -> str:
@@ -25,7 +26,7 @@ def figures(record: Run, verbose: bool = False) -> Iterator[str]:
     each = [f"{count} {product}" for product, count in record.by_product.items()]
     yield (
         f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
-        f"({record.realtime_factor:.1f} times real time, {record.world})"
+        f"({paced(record.realtime_factor)} times real time, {record.world})"
         + (f": {', '.join(each)}" if len(each) > 1 else "")
     )
     yield (

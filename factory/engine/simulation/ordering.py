@@ -16,8 +16,12 @@ from factory.theory.nets.coordinated import Order, Past
 
 class Ordering:
     """The order places of a coordinated net, by the waiting transition. For a place that begins
-    with a pass, the transition before the pass is waited for too. `held`: the passes that
-    transitions were found to wait for; `lacking`: the transitions that they wait for."""
+    with a pass, the transition before the pass is waited for too.
+
+    Attributes:
+        held: the passes that transitions were found to wait for.
+        lacking: the transitions that transitions were found to wait for.
+    """
 
     def __init__(self, orders: Iterable[Order] = ()) -> None:
         self.held, self.lacking = set[Past](), set[int]()

@@ -55,8 +55,8 @@ SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts ar
 
 @dataclass(frozen=True)
 class Compiled:
-    """What runs that differ in seed and jitter alone share: modes and, in MuJoCo, the model and the
-    engine's model `loaded` of it. A run writes into a copy of that one."""
+    """What runs share that differ in seed and jitter alone: the mode of each operation and, in
+    MuJoCo, the model and the engine's model `loaded` of it, of which a run takes a copy."""
 
     modes: tuple[Mode, ...]
     model: Model | None = None
@@ -64,14 +64,20 @@ class Compiled:
 
 
 class Simulation:
-    """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
+    """One run, ready to go: `run()` does it.
 
-    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A run
-    that stalls or takes too long has its trouble, which `require` makes an error. `compiled`: what
-    it shares with earlier runs, made by `compiled` for the same layout and a request that differs
-    in seed and jitter alone. `counts`: how often each transition has fired where it starts;
-    `before`: products that had left by then. `asked`: the request as given; in `request` the
-    timestep is a number, and `wip` is one where the pool of parts is too large. `timing`: delays.
+    Args:
+        compiled: what `compiled` made for an earlier run of the layout.
+
+    Attributes:
+        asked: the request as given; `request` has a timestep, and a `wip` where one was chosen.
+        model: the MJCF that the engine is given; None in the ideal world.
+        world, supervisor: the world, and what fires the net over it.
+        modes, limits: the mode of each operation, and the limits of all axes.
+        timing: the delays of operations.
+        counts, before: how often each transition had fired, and how many products had left before.
+
+    Raises InputError where the engine refuses the model, or a mode starts outside its domain.
     """
 
     def __init__(
@@ -82,7 +88,7 @@ class Simulation:
     ) -> None:
         if request.demand and request.world == "mujoco":
             layout = on_demand(layout)
-        self.layout, self.asked = layout, request
+        self.layout, self.asked, self._shared = layout, request, compiled
         self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
@@ -113,6 +119,11 @@ class Simulation:
         if self.start != net.initial_marking:
             supervisor.ordering.keep_passes()
         self.supervisor: RunSupervisor = supervisor
+
+    def again(self, seed: int) -> Simulation:
+        """Another run of the same with another seed; what both share is compiled once."""
+        self._shared = self._shared or compiled(self.layout, self.asked)
+        return Simulation(self.layout, replace(self.asked, seed=seed), self._shared)
 
     @cached_property
     def patience(self) -> float:
@@ -158,16 +169,9 @@ class Simulation:
         if self.start != factory.net.initial_marking:
             message = "a distributed run starts where every robot waits with no part"
             raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
-        return DistributedSupervisor(
-            factory,
-            self.modes,
-            self.limits,
-            self.world,
-            settings.step,
-            settings.steps,
-            self.request.seed,
-            stages,
-        )
+        ticks = settings.step, settings.steps
+        moved = self.modes, self.limits, self.world
+        return DistributedSupervisor(factory, *moved, *ticks, self.request.seed, stages)
 
     @property
     def physical(self) -> MujocoWorld:
@@ -185,7 +189,7 @@ class Simulation:
     @property
     def engine(self) -> EngineModel | None:
         """The engine's model; None in the ideal world."""
-        return None if self.model is None else self.physical.m
+        return self.physical.m if self.model else None
 
     @property
     def at_ends(self) -> list[Observer]:

@@ -35,11 +35,26 @@ from factory.theory.problem.ids import TransitionId
 class Supervisor:
     """Runs the gear net of a factory from a legal marking over a world.
 
-    `threads` is (m, f_m): every firing moves robots by the redistribution functions and asserts
-    that the marking stays legal. `counts`: how often each transition has fired where the run
-    starts. `stages`: what robots do while they wait, where that is not to stand; nothing of it is
-    in the net. `ordering`: the order places of the coordinated net. `enabled`: some operation may
-    start that could not in the last tick.
+    Args:
+        factory: the factory.
+        modes: the mode of each operation.
+        limits: the limits of all axes.
+        world: the world in which robots move.
+        tick: length of a tick [s].
+        start: the marking in which the run begins.
+        counts: how often each transition has fired there.
+        stages: what robots do while they wait, where that is not to stand; nothing of it is in
+            the net.
+
+    Attributes:
+        threads: the marking (m, f_m): every firing moves robots by the redistribution functions
+            and asserts that the marking stays legal.
+        fired: how often each transition has fired (transitions,).
+        events: the firings so far.
+        ordering: the order places of the coordinated net.
+        active: the active modes, with their clocks.
+        enabled: whether some operation may start that could not in the last tick.
+        near: whether some mode may have come to its goal in the last tick.
     """
 
     def __init__(

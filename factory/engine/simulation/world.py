@@ -23,15 +23,23 @@ Job = tuple[Operation, int]
 
 @dataclass(slots=True)
 class Hooks:
-    """Callbacks of a world.
+    """Callbacks of a world, by which others observe a run and take part in it.
 
-    `before_step`: called before every timestep; `step_singly`: bodies may be anywhere, so every
-    timestep is inspected. `sensors`: map positions [m] and speeds [m/s] of all axes to measured
-    ones. `gates`: an operation may start only if all allow it; `judges`: it may end only if all
-    allow it. `ticks`: called after every tick. `ended`: observers of the `state` after operations
-    have ended and parts have changed hands; `ended_time` [s]: time they took. `trouble`: ends the
-    run; `busy` [s]: until this time a standstill is no stall. `account`: the failures of a run with
-    recovery.
+    Attributes:
+        before_step: called before every timestep.
+        step_singly: whether every timestep is inspected, since bodies may be anywhere.
+        sensors: map positions [m] and speeds [m/s] of all axes to measured ones, one after
+            another.
+        gates: an operation may start for a unit only if all allow it.
+        judges: an operation may end for a unit only if all allow it.
+        ticks: called after every tick.
+        ended: observers of the state in which operations have ended and parts have changed
+            hands.
+        state: gives that state.
+        ended_time: wall time that observers in `ended` took [s].
+        trouble: ends the run with this diagnostic.
+        busy: until this time a standstill is no stall [s].
+        account: the failures of a run with recovery.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)

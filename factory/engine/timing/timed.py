@@ -26,9 +26,17 @@ OUTFEED, FEEDER = "outfeed", "feeder"
 
 @dataclass(frozen=True)
 class Timed:
-    """A net with the `seconds` that a token stays in each place. `ways`: the places of robots that
-    go ahead while they wait, by robot and operation; `bounds`: those of a bound `wip` on what is
-    inside; `owners`: the robots (indices) that are in a place."""
+    """The timed net: a marked graph with the time that a token stays in each place.
+
+    Attributes:
+        timing: the delays of the factory's operations.
+        net: the net with its tokens.
+        seconds: time in each place [s].
+        ways: by robot and operation, the place of a robot that goes ahead while it waits.
+        bounds: the places of the bound `wip`.
+        wip: the most units inside at once; None for no bound.
+        owners: by place, the robots (index) that are in it.
+    """
 
     timing: Timing
     net: MarkedNet

@@ -2,8 +2,8 @@
 
 The carriage passes under the place where its payload is at B, so a bin stands beside its lane, low
 enough for payloads to pass over it. A robot at B opens its hand, and a jet of air blows the payload
-over there (`failing/jets.py`). A bin, and the way from hand to bin, keep clear of all regions of
-the clearance certificate. Where there is no room there is no bin.
+over there. A bin, and the way from hand to bin, keep clear of all regions of the clearance
+certificate. Where there is no room there is no bin.
 """
 
 from __future__ import annotations

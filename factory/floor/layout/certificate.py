@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.guidepath import Box, Point2
 from factory.support.errors import Diagnostic, Position
+from factory.support.showing import Told
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Factory
 
@@ -174,7 +175,7 @@ class Exclusions:
 
 
 @dataclass(frozen=True, slots=True)
-class Certificate:
+class Certificate(Told):
     """The certificate that robots which no mode couples cannot touch, nor their payloads.
 
     Attributes:
@@ -205,6 +206,11 @@ class Certificate:
     pairs: int = 0
     apart: Exclusions = field(default_factory=Exclusions, repr=False)
     crossing: tuple[Fault, ...] = field(default=(), repr=False)
+
+    def __repr__(self) -> str:
+        result = "holds" if self.holds else f"FAILS with {len(self.faults)} faults"
+        what = f"{len(self.robots)} robots, {self.pairs} pairs of regions"
+        return f"<Certificate: {result}, {what}, clearance {1e3 * self.clearance:g} mm>"
 
     @property
     def holds(self) -> bool:

@@ -1,5 +1,5 @@
 """The coordinated net of a layout: its compiled net with passes, hands that wait for each other,
-magazines and the tray (`nets/coordinated.py`).
+magazines and the tray (`theory/nets/coordinated.py`).
 
 Operations are ordered as when one unit is made alone. So a sequence in which each transition fires
 once stays possible, and no circuit is free of tokens.
@@ -29,9 +29,14 @@ HOME = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Served:
-    """The steps of a magazine for the part of an operation (index): the place in which its slider
-    goes up after the part `before` (by the operation that takes it), the place in which it is on
-    `top`, and the place in which it comes down with this part."""
+    """The steps of a magazine for the part of an operation, as places of the coordinated net.
+
+    Attributes:
+        before: the operation (index) that takes the part before.
+        up: the slider goes up after that part.
+        top: the slider is up.
+        down: the slider comes down with this part.
+    """
 
     before: int
     up: int
@@ -41,8 +46,13 @@ class Served:
 
 @dataclass(frozen=True)
 class Coordinated(CoordinatedNet):
-    """The coordinated net of a layout. `served`: by the operation (index) that takes a part;
-    `away`: by dropoff (index), the place in which the tray is away."""
+    """The coordinated net of a layout.
+
+    Attributes:
+        served: by the operation (index) that takes a part from a magazine, the steps of the
+            magazine.
+        away: by dropoff (index), the place in which the tray is away.
+    """
 
     served: Mapping[int, Served] = field(default_factory=dict, repr=False)
     away: Mapping[int, int] = field(default_factory=dict, repr=False)

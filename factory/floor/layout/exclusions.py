@@ -28,7 +28,8 @@ from factory.floor.layout.hands.leaving import before_next, farther, gone_by, ho
 from factory.floor.layout.homeward import Homeward
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
-from factory.floor.layout.presence import Near, Presence, near, nearer, nearest
+from factory.floor.layout.nearness import Near, near, nearer, nearest
+from factory.floor.layout.presence import Presence
 from factory.floor.layout.staying import Staying
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past

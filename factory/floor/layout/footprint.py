@@ -33,12 +33,16 @@ Strip = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Footprint:
-    """The footprint of a robot with a `shape`.
+    """The footprint of one robot.
 
-    `stops`: where it stands for the operations after which it carries something, one after the
-    other; the first may be at a feeder. `returns`: whether it comes back to some: then all that it
-    ever holds may be anywhere from the first of them on. `corridor`: whether its way ahead is kept
-    free for its last pile.
+    Attributes:
+        shape: the robot's shape with its payloads.
+        clearance: the clearances to keep.
+        stops: where it stands for the operations after which it carries something, one after
+            the other; the first may be at a feeder.
+        returns: whether it comes back to some: then all that it ever holds may be anywhere from
+            the first of them on.
+        corridor: whether its way ahead is kept free for its last pile.
     """
 
     shape: Shape

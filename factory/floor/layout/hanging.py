@@ -27,12 +27,15 @@ FAR = 100.0
 
 @dataclass(frozen=True, slots=True)
 class Hanging:
-    """The sliders of a layout's feeders, each named after the first of the outlets whose parts hang
-    from it by turns.
+    """The sliders of a layout's feeders. Several outlets may share a slider, whose parts hang from
+    it in turn; it is named after the first of them.
 
-    `slider`: the name of that of each label; `places`: by that name, where its pad is in the frame
-    of the named outlet's feeder when the slider presents the part of that; `raised`: how much
-    higher the slider is when it presents each of its parts, negative for lower [m].
+    Attributes:
+        slider: by label, the name of its slider.
+        places: by that name, where the slider's pad is in the frame of the named outlet's
+            feeder when it presents that part.
+        raised: by label, how much higher the slider is when it presents that part, negative for
+            lower [m].
     """
 
     slider: Mapping[str, str]

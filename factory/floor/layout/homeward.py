@@ -11,7 +11,8 @@ from factory.floor.layout.coordinating import HOME
 from factory.floor.layout.hands.leaving import SPARE
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.presence import Near, Nearness, Presence, alike, nearest
+from factory.floor.layout.nearness import Near, Nearness, alike, judged
+from factory.floor.layout.presence import Presence
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import marked_after
 from factory.theory.nets.marked import MarkedNet
@@ -30,11 +31,15 @@ class Homeward(Nearness):
 
     def nearer(self, pair: Near) -> Near | None:
         """As `Nearness.nearer`; for two robots on one stem by the boxes of their bodies."""
-        robots = [side.robot for side in (pair.one, pair.other) if not side.bears]
+        one, other = self._on_stem(pair.one, pair.other)
+        return super().nearer(replace(pair, one=one, other=other))
+
+    def _on_stem(self, one: Presence, other: Presence) -> tuple[Presence, Presence]:
+        """Two presences; those of two robots on one stem with bodies that fill their boxes."""
+        robots = [side.robot for side in (one, other) if not side.bears]
         if len({*robots}) == 2 and self._layout.share_stem(*robots):
-            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (pair.one, pair.other))
-            pair = replace(pair, one=one, other=other)
-        return super().nearer(pair)
+            one, other = (replace(p, bodies=p.bodies.as_boxes) for p in (one, other))
+        return one, other
 
     def _since_visit(self, past: Past) -> float:
         """How far a pass is from where its operation was visited [m], backwards below 0."""
@@ -61,8 +66,7 @@ class Homeward(Nearness):
 
         def clear(at: float) -> bool:
             there = replace(one, sweeps=(((at, home), (low, high)),))
-            pair = nearest(there, other, layout.clearance)
-            return pair is None or self.nearer(pair) is None
+            return judged(*self._on_stem(there, other), layout.clearance) is None
 
         short, far = begin, home - SPARE
         if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):

@@ -52,11 +52,18 @@ shorter is taken."""
 class Task:
     """What all robots of a factory are packed with.
 
-    `weights`: how much the time of each robot matters, 1 for the bottleneck; `breadth`: how much of
-    its extent to the sides a robot is charged to be slower for those it delivers to; `width`: how
-    many ways are kept; `corridor`: whether the output robot's way ahead is kept free for the
-    product, so that the outfeed can begin beside the others; `wide`: robots whose ways have room
-    for relays; `hands`: those of the robots, None where they are not chosen.
+    Attributes:
+        factory: the factory.
+        clearance: the clearances to keep.
+        pace: the speed and acceleration of robots.
+        weights: how much the time of each robot matters, 1 for the bottleneck (robots,).
+        breadth: share of its extent to the sides by which a robot slows those down that it
+            delivers to, as they are charged for it.
+        width: number of ways that are kept.
+        corridor: whether the output robot's way ahead is kept free for the product, so that the
+            outfeed can begin beside the others.
+        wide: robots (index) whose ways have room for relays.
+        hands: those of the robots; None where they are not chosen.
     """
 
     factory: Factory

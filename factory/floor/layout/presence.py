@@ -1,26 +1,23 @@
-"""Where the solid bodies of machines are while places of a net are marked, and which come near.
+"""Where the solid bodies of machines are while places of a net are marked.
 
 A machine is whatever has axes and moves: a robot, the sliders of a magazine, the outfeed's tray;
 what stands is there in every marking. MachineBodies are swept as boxes over the intervals of their
-machine's axes. Two presences of different machines are *near* where bodies of both come closer than
-drives and grips need, and both are not one and the same mode, whose field keeps its robots apart.
+machine's axes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from hashlib import sha256
 from itertools import product
 
 import numpy as np
-import shapely
 
-from factory.floor.layout.crossings import near as near_boxes
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.guidepath import Guidepath
-from factory.floor.mating.depth import Polytope, exact, polytope, rough
+from factory.floor.mating.depth import Polytope, polytope, upright_box
 from factory.support.arrays import Array, Index, Truth
 
 ACROSS = 5e-5
@@ -69,8 +66,8 @@ class MachineBodies:
     def swept(self, leg: Leg) -> Array:
         """The boxes (n, 2, 3) of all that they take on a leg."""
         points, second = leg
-        swept = self.boxes + np.stack([points.min(axis=0), points.max(axis=0)])
-        swept[self.rise, :, 2] += np.sort(second)
+        swept = self.boxes + np.sort(points, axis=0)[[0, -1]]
+        swept[self.rise, :, 2] += sorted(second)
         return np.asarray(swept)
 
     def legs(self, first: Span, second: Span) -> Iterator[Leg]:
@@ -173,6 +170,10 @@ class Presence:
         sizes = repr((self.sweeps, *map(len, bodies.corners))).encode()
         return sha256(sizes + b"".join(one.tobytes() for one in arrays)).digest(), bodies.bent
 
+    def is_apart(self, other: Presence) -> bool:
+        """Whether it has no place in common with another."""
+        return {*self.places}.isdisjoint(other.places)
+
     def name(self, number: int) -> str:
         """The body of one of the boxes."""
         return self.bodies.names[number % len(self.bodies.names)]
@@ -193,120 +194,16 @@ class Presence:
         rise = UP * bool(self.bodies.rise[body])
         ends = [point + rise * z for point in points for z in {*second}]
         corners = self.bodies.corners[body] + self.bodies.origins[body]
-        return polytope(np.concatenate([corners + end for end in ends]))
+        points = np.concatenate([corners + end for end in ends])
+        low, high = points.min(axis=0), points.max(axis=0)
+        return upright_box(low, high) if _fill(points, low, high) else polytope(points)
 
 
-Lacking = tuple[float, int, int]
-"""By how much nearer than they may two boxes come [m], and their numbers."""
-
-
-@dataclass(frozen=True, slots=True)
-class Near:
-    """Two presences that come near, which `bodies` of theirs come nearest, and by how much nearer
-    than they may (`lacking`) [m]."""
-
-    one: Presence
-    other: Presence
-    bodies: tuple[str, str]
-    lacking: float
-
-
-def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
-    """The pairs of presences of different machines without a common place that come near: nearer
-    than ACROSS, or than the clearance [m] where bodies are in one layer and their machines do not
-    work together. Near linear."""
-    hulls = np.array([presence.hull for presence in presences]).reshape(-1, 2, 3)
-    machine = np.unique([presence.machine for presence in presences], return_inverse=True)[1]
-    low, high = hulls[:, 0] - clearance / 2, hulls[:, 1] + clearance / 2
-    for first, second in near_boxes(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])):
-        meets = (low[first] < high[second]).all(axis=1) & (low[second] < high[first]).all(axis=1)
-        meets &= machine[first] != machine[second]
-        for i, j in zip(first[meets].tolist(), second[meets].tolist(), strict=True):
-            one, other = presences[i], presences[j]
-            if not {*one.places}.isdisjoint(other.places):
-                continue
-            if (pair := nearest(one, other, clearance)) is not None:
-                yield pair
-
-
-def nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
-    """Two presences with the bodies whose boxes come nearest, relative to the distance they need,
-    if any come too near."""
-    pairs = _pairs(one, other, clearance)
-    lacking, i, j = max(pairs, default=(0.0, 0, 0))
-    return Near(one, other, (one.name(i), other.name(j)), lacking) if pairs else None
-
-
-def nearer(near: Near, clearance: float) -> Near | None:
-    """The same, judged by the bodies themselves, which may be apart where their boxes are not."""
-    judged = _judged(near.one, near.other, clearance)
-    return judged and _named(near, judged)
-
-
-class Nearness:
-    """Judges pairs of presences as `nearer`, each only once for all that are alike: in the turns of
-    a period, and in the rounds of a search."""
-
-    def __init__(self, clearance: float) -> None:
-        self._clearance, self._known = clearance, dict[Hashable, Lacking | None]()
-
-    def nearer(self, near_pair: Near) -> Near | None:
-        """The pair as `nearer` judges it."""
-        if (pair := alike(near_pair.one, near_pair.other)) not in self._known:
-            self._known[pair] = _judged(near_pair.one, near_pair.other, self._clearance)
-        judged = self._known[pair]
-        return judged and _named(near_pair, judged)
-
-
-def alike(one: Presence, other: Presence) -> Hashable:
-    """A key of two presences: pairs with equal keys come near alike."""
-    apart = one.partners.isdisjoint(other.partners)
-    return one.filled, other.filled, apart, one.bears or other.bears
-
-
-def _named(pair: Near, judged: Lacking) -> Near:
-    lacking, i, j = judged
-    return replace(pair, bodies=(pair.one.name(i), pair.other.name(j)), lacking=lacking)
-
-
-def _judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
-    """The bodies that come too near, and by how much; edges count only if faces do not decide."""
-    for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
-        need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
-        solids = one.solid(i), other.solid(j)
-        if need + float(rough(*solids).bounds.min()) <= ROUNDING:
-            continue
-        if (lacks := min(lacking, need + float(exact(*solids).bounds.min()))) > ROUNDING:
-            return lacks, i, j
-    return None
-
-
-def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
-    """The pairs of boxes of two presences that come too near, and by how much."""
-    across = 0.0 if one.bears or other.bears else ACROSS
-    apart = across if one.partners & other.partners else clearance - 2 * (ALONG + ROUNDING)
-    here = _within(one.boxes, other.hull, apart)
-    there = _within(other.boxes, one.hull, apart) if len(here) else here
-    if not len(there):
-        return []
-    a, b = one.boxes[here][:, None], other.boxes[there][None]
-    layer, beside = one.layers[here][:, None], other.layers[there][None]
-    alike = (layer == beside) | (layer == ANY) | (beside == ANY)
-    lacking = np.where(alike, apart, across) + _overlap(a, b)
-    pairs = zip(*np.nonzero(lacking > ROUNDING), strict=True)
-    return [(float(lacking[i, j]), int(here[i]), int(there[j])) for i, j in pairs]
-
-
-def _overlap(one: Array, other: Array) -> Array:
-    """Depth of overlap of boxes (..., 2, 3); negative: their distance (...) [m]."""
-    low = np.maximum(one[..., 0, :], other[..., 0, :])
-    return np.asarray((np.minimum(one[..., 1, :], other[..., 1, :]) - low).min(axis=-1))
-
-
-def _within(boxes: Array, hull: Array, apart: float) -> Index:
-    """Which boxes (n, 2, 3) come nearer than a distance to a box (2, 3)."""
-    meets = (boxes[:, 0] < hull[1] + apart) & (boxes[:, 1] > hull[0] - apart)
-    return np.flatnonzero(meets.all(axis=1))
+def _fill(points: Array, low: Array, high: Array) -> bool:
+    """Whether the hull of points (n, 3) is the box round them, from `low` to `high` (3,)."""
+    above = points == high
+    at_corner = (above | (points == low)).all(axis=1)
+    return len({*(above[at_corner] @ (1, 2, 4)).tolist()}) == 8
 
 
 def corners_of(boxes: Array) -> tuple[Array, ...]:

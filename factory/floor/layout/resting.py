@@ -18,7 +18,8 @@ from factory.floor.layout.exclusions import Further, awaited_positions, exclusio
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import magazines
-from factory.floor.layout.presence import Near, Presence
+from factory.floor.layout.nearness import Near
+from factory.floor.layout.presence import Presence
 from factory.floor.layout.starting import start_positions
 from factory.floor.layout.staying import Staying, Sweep, comes_last
 from factory.support.arrays import Array

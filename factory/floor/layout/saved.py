@@ -26,10 +26,19 @@ AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 @dataclass(frozen=True, slots=True)
 class LayoutTable:
-    """What is kept of a layout, by the names that `Layout` has; `visits`: for each operation those
-    of its robots. `plain`: the layout without relays, None where this is one. `frame`: the box
-    (low, high) about the product's middle, None where that is the product's own; `tile`: the size
-    of the tiles of a platen [m], 0 without one."""
+    """A layout as it is kept in a file, by the names that `Layout` has.
+
+    Attributes:
+        clearance: least distance between machines [m].
+        guidepaths: of each robot.
+        visits: for each operation those of its robots.
+        outfeed: the box of the conveyor [m].
+        hands: of each robot; None for tools.
+        plain: the layout without relays; None where this is one.
+        frame: the box (low, high) about the product's middle [m]; None where that is the
+            product's own.
+        tile: size of the tiles of a platen [m]; 0 without one.
+    """
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]

@@ -76,7 +76,7 @@ class Staying:
 
     def __init__(self, layout: Layout, net: Coordinated, awaited: Mapping[int, float]) -> None:
         self.layout, self.net, self._awaited = layout, net, awaited
-        self._own = [_own(layout, robot.index) for robot in layout.factory.robots]
+        self._own = [layout.kept(_own, robot.index) for robot in layout.factory.robots]
         self.partners = _partners(layout)
 
     def presences(self) -> Iterator[Presence]:
@@ -128,7 +128,7 @@ class Staying:
         """Pairs of robots at the end of an operation of both, the first without its payload, the
         second with it. All robots stand at their goals; of a robot that waits for its carrier the
         last stretch counts, and of a lift that is lowered its stroke. Whether payloads collide is
-        judged in `compiler/mating`."""
+        judged in `floor/mating/`."""
         for operation in self.layout.factory.making:
             carrier = operation.robots.index(operation.carrier)
             for pair in permutations(range(len(operation.robots)), 2):

@@ -15,9 +15,14 @@ from factory.theory.plant.operation import Operation
 @dataclass(frozen=True, slots=True)
 class Stop:
     """Where a robot stands for one operation or, on a line, for several: those to which the same
-    robots deliver. `visits`: how often it comes there from another stop, in all its tours but those
-    that are the same for another unit of a period; `guests`: the robots whose guidepaths end
-    there."""
+    robots deliver.
+
+    Attributes:
+        operations: the operations.
+        visits: how often it comes there from another stop, in all its tours but those that are
+            the same for another unit of a period.
+        guests: the robots whose guidepaths end there.
+    """
 
     operations: tuple[Operation, ...]
     visits: int = 1

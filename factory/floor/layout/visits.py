@@ -26,12 +26,16 @@ from."""
 
 @dataclass(frozen=True, slots=True)
 class Visit:
-    """Configuration of a robot at the end of an operation: the arc length `at` of its carriage and
-    the height `lift` of its lift, 0 without one [m]; and how it holds its payload on this tour.
+    """The configuration of a robot at the end of an operation, and how it holds its payload on this
+    tour.
 
-    `up`: height of its lift until it delivers; `elevation`: height of the payload until then above
-    its place in the product; `shift`: the product's middle relative to where the guidepath has it,
-    in the world (x, y) [m].
+    Attributes:
+        at: arc length of its carriage [m].
+        lift: height of its lift, 0 without one [m].
+        up: height of its lift until it delivers [m].
+        elevation: height of the payload until then above its place in the product [m].
+        shift: the product's middle relative to where the guidepath has it, in the world (x, y)
+            [m].
     """
 
     at: float

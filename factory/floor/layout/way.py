@@ -43,10 +43,12 @@ class Ways:
     """Some ways (n,) from the origin, which begin and end along the first axis, piece by piece:
     straight and round in turn, each with a constant second derivative.
 
-    `ends` (n, 2c + 2): the coordinates of the ends of pieces, from -FAR to FAR, padded with FAR for
-    ways with fewer pieces; `middle` (n, 2c + 1): where
-    straight ones begin, and the corners of round ones; `terms` (n, 2c + 1, 3, 2): place, first and
-    second derivative there; `rounding` (n,) [m].
+    Attributes:
+        ends: coordinates of the ends of pieces, from -FAR to FAR, padded with FAR for ways with
+            fewer pieces (n, 2c + 2).
+        middle: where straight pieces begin, and the corners of round ones (n, 2c + 1).
+        terms: place, first and second derivative there (n, 2c + 1, 3, 2).
+        rounding: (n,) [m].
     """
 
     ends: Array

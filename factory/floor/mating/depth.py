@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,21 @@ from numpy.typing import NDArray
 from factory.support.arrays import Array
 
 SMALL = 1e-12
+
+CORNERS = np.array([*product((0.0, 1.0), repeat=3)])
+"""The corners (8, 3) of a unit box."""
+
+BOX_NORMALS = np.concatenate([np.eye(3), -np.eye(3)])
+"""The outward normals (6, 3) of a box."""
+
+BOX_EDGES = np.array(
+    [
+        (along, one, other)
+        for along, *beside in (np.eye(3), np.roll(np.eye(3), -1, 0), np.roll(np.eye(3), -2, 0))
+        for one, other in product(*((normal, -normal) for normal in beside))
+    ]
+)
+"""The edges (12, 3, 3) of a unit box, as those of a Polytope."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +77,12 @@ def polytope(vertices: Array) -> Polytope:
         [tips[:, 1] - tips[:, 0], normals[number[face]], normals[number[across]]], axis=1
     )
     return Polytope(vertices[hull.vertices], normals, edges)
+
+
+def upright_box(low: Array, high: Array) -> Polytope:
+    """The box along the axes with corners `low` and `high` (3,), without a search for its hull."""
+    corners = np.where(CORNERS, high, low)
+    return Polytope(corners, BOX_NORMALS, BOX_EDGES * [high - low, np.ones(3), np.ones(3)])
 
 
 def _support(normals: Array, vertices: Array) -> Array:

@@ -66,10 +66,17 @@ class BodyPairs:
 @dataclass(frozen=True)
 class Overlaps:
     """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
-    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `depths` as they
-    are drawn, `colliding` as their bodies collide; `rough` (n,): whether one of them is known by
-    its hull alone; `bodies`: what overlaps of them, those of row i from `starts[i]` to
-    `starts[i + 1]` (n + 1,)."""
+    meeting.
+
+    Attributes:
+        meeting: the number of the meeting (n,).
+        one, other: the numbers of the parts, one < other (n,).
+        depths: their depths as they are drawn.
+        colliding: their depths as their bodies collide.
+        rough: whether one of them is known by its hull alone (n,).
+        bodies: the bodies that overlap.
+        starts: those of row i are from `starts[i]` to `starts[i + 1]` (n + 1,).
+    """
 
     meeting: Indices
     one: Indices

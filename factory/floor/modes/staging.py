@@ -29,9 +29,17 @@ from factory.theory.problem.ids import AxisId, carriage_axis
 
 @dataclass(frozen=True, slots=True)
 class HeadStart:
-    """The way of a robot ahead of one of its operations: the `mode` that moves one `axis` of it
-    alone, its carriage or its lift, to the goal of its `slot` there, and where it `starts` in the
-    long run [m]; whether it `follows` another of the same operation, that of its lift."""
+    """The way of a robot ahead of one of its operations, while it waits.
+
+    Attributes:
+        robot: the robot (index).
+        operation: the operation (index).
+        slot: the robot's slot in it.
+        mode: the mode that moves one axis of the robot to its goal there.
+        start: where the axis starts in the long run [m].
+        axis: the axis, of its carriage or its lift.
+        follows: whether it follows another of the same operation, that of the lift.
+    """
 
     robot: int
     operation: int

@@ -63,12 +63,28 @@ class _Terms:
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
     """All active modes, concatenated: a configuration x (n,) has the robots of the first mode
-    first, in the mode's order. `starts` (modes,): the number of each mode's first robot; `sizes`
-    (modes,): how many it has. `dwells`: a clock has to run out in some mode. `clocked` (modes,):
-    modes that rest in their goal balls until their clocks have run out, so that their ends are
-    known; None for none.
+    first, in the mode's order. No call loops over robots or modes; arrays are made once, by `of`.
 
-    No call loops over robots or modes; arrays are made once, by `of`.
+    Attributes:
+        modes: the modes.
+        starts: the number of each mode's first robot (modes,).
+        sizes: the number of its robots (modes,).
+        owner: the mode of each robot (n,).
+        goal: goals (n,) [m].
+        lower, upper: the bounds of the domains (n,) [m].
+        eps: radius of the goal ball of the robot's mode (n,) [m].
+        softness: s of the robot's mode (n,) [m].
+        speed: speed limits (n,) [m/s].
+        acceleration: acceleration limits (n,) [m/s²].
+        span: length of each mode's way (modes,) [m].
+        dwell: time that each mode stays in its goal (modes,) [s].
+        gates: robots that others wait for (the L-shaped W).
+        pairs: robots that must not touch each other (Δ).
+        moving: 0 for robots of modes that only stand, 1 for others (n,); None where none
+            stands.
+        clocked: modes that rest in their goal balls until their clocks have run out, so that
+            their ends are known (modes,); None for none.
+        dwells: whether a clock has to run out in some mode.
     """
 
     modes: tuple[Mode, ...]

@@ -43,11 +43,14 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Composition:
-    """The gears in the order in which they compose the net, or the defects that forbid it.
+    """The gears of a net in the order in which they compose it, or the defects that forbid it.
 
-    `closed`: for each gear whether it is a cycle of the net; `fitting`: whether all are, cover the
-    net, and share one place at each transition where they meet, so that no more than a tree is
-    missing (`train`).
+    Attributes:
+        joints: how each gear is added to those before it.
+        defects: what forbids it.
+        closed: whether each gear is a cycle of the net.
+        fitting: whether all are, cover the net, and share one place at each transition where
+            they meet, so that no more than a tree is missing (`train`).
     """
 
     joints: tuple[Joint, ...]

@@ -22,8 +22,14 @@ from factory.theory.problem.ids import AxisId, PlaceId, TransitionId, is_end
 
 @dataclass(frozen=True, slots=True)
 class Past:
-    """A pass: an `axis` has come as far as `at` [m], or further in its `direction` (+1 or -1),
-    since the transition `after` has fired."""
+    """A pass: the moment in which an axis has come past a point.
+
+    Attributes:
+        after: the transition since whose firing it counts.
+        axis: the axis.
+        at: the point [m].
+        direction: +1 where the axis comes to larger positions, -1 to smaller ones.
+    """
 
     after: TransitionId
     axis: AxisId
@@ -37,10 +43,17 @@ class Past:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An order place: the transition `start` has fired at most `tokens` times more often than
-    `before`, a transition of the compiled net, or than the pass `past` that follows it. That comes
-    before the transition `end` of its robot, which has fired at most `held` times more often than
-    what the pass follows."""
+    """An order place: an operation starts only after another transition, or after a pass.
+
+    Attributes:
+        before: the transition that comes first: it, or the pass that follows it.
+        start: the transition that waits. It has fired at most `tokens` times more often.
+        tokens: the tokens of the place.
+        past: the pass, where one is waited for.
+        end: the transition by which the pass has happened, that of its robot after it; NONE
+            without a pass. It has fired at most `held` times more often than `before`.
+        held: tokens of the robot's place between the two.
+    """
 
     before: TransitionId
     start: TransitionId
@@ -52,10 +65,15 @@ class Order:
 
 @dataclass(frozen=True)
 class CoordinatedNet:
-    """A marked graph whose first places and transitions are those of the compiled net. `passes`:
-    the place that each pass ends, and the pass where that begins, None for the transition that it
-    follows; `beside`: places that have as many tokens as one of the compiled net, which they are
-    beside; `orders`: those that a supervisor keeps."""
+    """A marked graph whose first places and transitions are those of the compiled net.
+
+    Attributes:
+        net: the net with its tokens.
+        passes: for each pass the place that it ends, and the pass where that place begins; None
+            where it begins with the transition that the pass follows.
+        beside: places that have as many tokens as one of the compiled net, each with that one.
+        orders: the order places that a supervisor keeps.
+    """
 
     net: MarkedNet
     passes: Mapping[Past, tuple[PlaceId, Past | None]] = field(repr=False)

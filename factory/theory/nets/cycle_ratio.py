@@ -31,10 +31,15 @@ ROUNDING = 1e-12
 class CycleRatio:
     """The greatest quotient of seconds and tokens over all circuits, with its proof.
 
-    `seconds`: the ratio r [s]; `circuit`: the places of a circuit that attains it, in order;
-    `dates` (T,): v [s], in parts of the net that hang together in no circuit 0. `edges` are the
-    places that lie on circuits, `before` and `after` their transitions; `reduced` (E,) >= 0: by how
-    much each could take longer until v is no proof any more.
+    Attributes:
+        seconds: the ratio r [s].
+        circuit: the places of a circuit that attains it, in order.
+        dates: v, a date of each transition (transitions,) [s]; 0 in parts of the net without
+            circuits.
+        edges: the places that lie on circuits (E,).
+        before, after: their transitions (E,).
+        reduced: by how much each of them could take longer until v is no proof any more (E,)
+            [s].
     """
 
     seconds: float

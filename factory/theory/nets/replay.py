@@ -18,10 +18,15 @@ from factory.theory.nets.undone import Entry, Joins, Undone
 
 @dataclass(frozen=True, slots=True)
 class ReplayVerdict:
-    """Whether every event could fire in its turn and every marking was legal.
+    """Whether every event of a record could fire in its turn, and every marking was legal.
 
-    `index` and `reason`: the first fault, counted from 0 (-1: the initial marking itself); None and
-    "" where there is none. `marking`: the last marking before it; `events`: how many fired.
+    Attributes:
+        refines: whether that is so.
+        index: the first event that could not, counted from 0; -1 where the initial marking is
+            not legal, None where there is no fault.
+        reason: why not, "" where there is no fault.
+        marking: the last marking before the fault.
+        events: number of events that fired.
     """
 
     refines: bool

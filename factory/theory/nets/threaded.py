@@ -72,8 +72,15 @@ class _Firing:
 class Threads:
     """A legal marking (m, f_m) of a threaded net, which changes as transitions fire.
 
-    `marked` (places,): m; `robots`: f_m, the robot in each slot of a marked place. `possible`:
-    the transitions, of those `asked` for, whose presets are marked.
+    Args:
+        net: the net.
+        robots: the marking at first: the robot in each slot of a marked place.
+        asked: the transitions of which `possible` tells.
+
+    Attributes:
+        marked: m, 1 for a marked place (places,).
+        robots: f_m, the robot in each slot of a marked place.
+        possible: those transitions of `asked` whose presets are marked.
     """
 
     def __init__(self, net: ThreadedNet, robots: Mapping[Slot, int], asked: Iterable[int]) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from factory.support.errors import Position
+from factory.support.showing import Told
 from factory.theory.nets.gears import Gear
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.problem.pag import NOPART
@@ -64,7 +65,7 @@ class Witness:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Verdict(Told):
     """The properties of a net, each True, False, or None where it is undecided.
 
     Attributes:
@@ -91,6 +92,11 @@ class Verdict:
     gears: tuple[Gear, ...] = field(default=(), repr=False)
     method: str = "structure"
     gear_train: bool | None = None
+
+    def __repr__(self) -> str:
+        words = {True: "", None: "undecided: ", False: "not "}
+        claims = (words[getattr(self, name)] + name.replace("_", " ") for name in self.properties)
+        return f"<Verdict by {self.method}: {', '.join(claims)}>"
 
     @property
     def properties(self) -> tuple[str, ...]:

@@ -1,0 +1,2 @@
+"""The factory as the compiler makes it: robots, operations, programs, and the order in which units
+are made."""

@@ -1,4 +1,4 @@
-"""How the inputs of an operation can come together: a value, found by `compiler/mating/` from the
+"""How the inputs of an operation can come together: a value, found by `floor/mating/` from the
 geometry of a product, used by Compile (robot types), the layout (sides) and the run (contacts)."""
 
 from __future__ import annotations
@@ -53,14 +53,20 @@ class Clash:
 class Approach:
     """The admissible approaches of one operation with two inputs (or a pile and one more).
 
-    `axis`: 0 for x or 1 for y of the product, along which its inputs come in the layout. `sides`:
-    the sides of that axis, +1 or -1, from which the *last* input may come (moving against it); the
-    other comes from, or stands on, the opposite side. `lowered`: the label of the input that comes
-    `stroke` [m] above its place and is lowered when all others stand, "" where none is. `overlaps`:
-    for each of `sides` the parts that cannot come so without overlapping or scraping. `clashes`:
-    where it is blocked, the pairs that pass through each other as they are drawn if the last input
-    comes from the first of its sides, the deepest first; otherwise the pairs that get no deeper
-    into each other than they are in the finished product, but cut more out of each other.
+    Attributes:
+        kind: whether inputs slide, one is lowered, or they are blocked.
+        axis: 0 for x or 1 for y of the product, along which the inputs come in the layout.
+        sides: the sides of that axis, +1 or -1, from which the *last* input may come (moving
+            against it); the other comes from, or stands on, the opposite side.
+        lowered: the input that comes from above and is lowered when all others stand; "" for
+            none.
+        stroke: height from which it is lowered [m].
+        overlaps: for each of `sides` the parts that cannot come so without overlapping or
+            scraping.
+        clashes: where it is blocked, the pairs that pass through each other as they are drawn
+            if the last input comes from the first of its sides, the deepest first; otherwise
+            the pairs that get no deeper into each other than they are in the finished product,
+            but cut more out of each other.
     """
 
     kind: Kind

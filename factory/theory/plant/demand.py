@@ -52,11 +52,19 @@ class Demand:
 
 @dataclass
 class Word:
-    """The letters that have been fixed of a run that ends when so many units (`most`) of a
-    `sequence` of products have been made. `units`: the units of the net that are made, in order;
-    `fixed`: of how many units of the net that is known. `wip`: at most so many are fixed that have
-    not been dropped off. `made`: dropped off so far; `now`: the time [s]. Without a `demand` every
-    unit is made."""
+    """The order in which units are made, as far as it is fixed: the word of a run, whose letters
+    are products. Without a demand every unit is made.
+
+    Attributes:
+        sequence: the products of a period.
+        demand: what is asked for; None where the sequence repeats.
+        most: number of units after which the run ends.
+        wip: the most letters that are fixed and not dropped off yet; None for no bound.
+        units: the units of the net that are made, in order.
+        fixed: number of units of the net of which it is known whether they are made.
+        made: number of units dropped off so far.
+        now: the time [s].
+    """
 
     sequence: Sequence[str]
     demand: Demand | None = None

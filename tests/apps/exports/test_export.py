@@ -15,6 +15,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from datetime import datetime
 from importlib.util import find_spec
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -35,6 +36,7 @@ from factory.apps.exports.subject import file_name
 from factory.apps.exports.svg import draw_net, draw_tree
 from factory.apps.exports.swimlanes import swimlanes
 from factory.apps.exports.urdf import roll_pitch_yaw
+from factory.apps.exports.xes import EPOCH
 from factory.apps.log import read_log
 from factory.floor.geometry.solids import rotation
 from factory.floor.modes.modes import operation_modes
@@ -100,6 +102,47 @@ def test_the_order_of_hashing_does_not_show() -> None:
     )
     here = [made(e.format) for e in exporters().values() if e.takes != "log"]
     assert done.stdout.split() == [hashlib.sha256(str(m).encode()).hexdigest() for m in here]
+
+
+# process mining
+
+
+def test_xes_has_a_trace_for_each_product(log: Path) -> None:
+    root = ElementTree.fromstring(made("xes", log))
+    space = {"x": "http://www.xes-standard.org/"}
+    traces = root.findall("x:trace", space)
+    rows = list(csv.DictReader(io.StringIO(made("csv", log))))
+    names = [trace.find("x:string", space).get("value") for trace in traces]
+    assert names[:2] == ["paper 1", "paper 2"]
+    for number, trace in enumerate(traces, 1):
+        events = [
+            {node.get("key"): node.get("value") for node in event}
+            for event in trace.findall("x:event", space)
+        ]
+        mine = [row for row in rows if int(row["unit"]) == number]
+        assert [e["transition"] for e in events] == [row["transition"] for row in mine]
+        assert [e["org:resource"] for e in events] == [row["robots"] for row in mine]
+        kinds = {"start": "start", "end": "complete"}
+        assert [e["lifecycle:transition"] for e in events] == [kinds[row["kind"]] for row in mine]
+        since = [datetime.fromisoformat(e["time:timestamp"]) - EPOCH for e in events]
+        for elapsed, row in zip(since, mine, strict=True):
+            assert elapsed.total_seconds() == pytest.approx(float(row["time_s"]), abs=1e-3)
+    assert sum(len(trace.findall("x:event", space)) for trace in traces) == len(rows) > 20
+
+
+def test_xes_of_a_mix_counts_units_of_the_period(tmp_path: Path) -> None:
+    family = project(ROOT / "examples" / "family.pag")
+    period = family.plain.period
+    log = kept_log(family.layout, tmp_path / "family.log", world="ideal", units=period)
+    root = ElementTree.fromstring(made("xes", log))
+    space = {"x": "http://www.xes-standard.org/"}
+    dropped = [
+        {node.get("value") for node in event}
+        for trace in root.findall("x:trace", space)[:period]
+        for event in trace.findall("x:event", space)
+        if any(node.get("value") == "dropoff" for node in event)
+    ]
+    assert period > 1 and len(dropped) == 2 * period
 
 
 # the command

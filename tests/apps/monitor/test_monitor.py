@@ -195,12 +195,12 @@ def weld(simulation: Simulation, name: str) -> int:
 def test_a_weld_that_is_never_released(paper: Layout) -> None:
     simulation = Simulation(paper, RunRequest(units=1))
     welds, kept = simulation.physical.parts.welds, weld(simulation, "grip/r5/part1")
-    loose = welds.loose
+    release = welds.open
 
     def sticky(off: Iterable[int]) -> None:
-        loose([number for number in off if number != kept])
+        release([number for number in off if number != kept])
 
-    welds.loose = sticky  # type: ignore[method-assign]
+    welds.open = sticky  # type: ignore[method-assign]
     run, report = watched(simulation, 3)
     t = next(e.t for e in run.events if e.transition == "sub1_e")
     assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
@@ -471,12 +471,12 @@ def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.M
     """Two parts are never let go: status 1, beside the run and from its log."""
     from factory.engine.simulation.mujoco.welds import Welds
 
-    loose = Welds.loose
+    release = Welds.open
 
     def sticky(self: Welds, off: Iterable[int]) -> None:
-        loose(self, [n for n in off if self._m.equality(n).name != "grip/r5/part1"])
+        release(self, [n for n in off if self._m.equality(n).name != "grip/r5/part1"])
 
-    monkeypatch.setattr(Welds, "loose", sticky)
+    monkeypatch.setattr(Welds, "open", sticky)
     log = tmp_path / "log"
     done = run("run", PAPER, "--monitor", "--max-time", 1, "--json", "--log", log)
     assert done.status == 1 and not done.json["refines_net"]

@@ -82,7 +82,7 @@ def test_a_front_has_what_it_must_have(front: ParetoFront) -> None:
         assert one.bound is not None
         assert one.seconds >= one.bound - 1e-9
         assert one.robots >= front.least.total
-    assert front.complete
+    assert front.ended == "complete" and not front.ending
 
 
 def test_no_point_is_worse_than_the_form_of_the_paper(quick: Project) -> None:
@@ -112,7 +112,7 @@ def test_estimates_alone_take_no_layout(quick: Project, monkeypatch: pytest.Monk
 def test_time_that_is_over_leaves_the_product_as_it_is_written(quick: Project) -> None:
     front = pareto(replace(quick), Effort(seconds=1e-6))
     assert front.points == (front.written,)
-    assert not front.complete
+    assert front.ended == "seconds" and "--seconds" in front.ending
 
 
 @pytest.mark.parametrize(("count", "numbers"), [(0, []), (1, [0]), (2, [0, 4]), (9, [*range(5)])])
@@ -203,26 +203,26 @@ def test_the_page_refers_to_nothing_outside_itself(front: ParetoFront, tmp_path:
     tried_ones = front.with_trial(0, Trial(4, 1.0, 1.01, 1.0)).with_trial(
         1, Trial(4, 1.0, None, None, (f"mujoco: Contact: {EVIL}",))
     )
-    evil = replace(tried_ones, name=EVIL, complete=False)
+    evil = replace(tried_ones, name=EVIL, ended="effort")
     plans = floor_plans(evil, tmp_path)
     commands = [f"factory run '{EVIL}'", *commands_of(evil, tmp_path)[1:]]
-    text = front_page(evil, commands, plans, tmp_path)
+    text = front_page(evil, commands)
     assert EVIL not in text
     assert not re.search(r'(?:src|href)="(?!#|data:)', text)
     assert "default-src 'none'" in text
     assert text.count('class="plan"') == len(front.points) == len(plans)
     assert all(f'href="#p{n + 1:02d}"' in text for n in range(len(front.points)))
-    assert "The search is incomplete" in text
-    assert text == front_page(evil, commands, plans, tmp_path)
+    assert "The search used up its effort after" in text
+    assert text == front_page(evil, commands)
 
 
-def test_a_page_without_layouts(front: ParetoFront, tmp_path: Path) -> None:
+def test_a_page_without_layouts(front: ParetoFront) -> None:
     given = [
         replace(p, estimated=p.predicted, predicted=None, area=None, work=None)
         for p in front.points
     ]
     bare = replace(front, points=tuple(given), written=None)
-    text = front_page(bare, ["x"] * len(given), {}, tmp_path)
+    text = front_page(bare, ["x"] * len(given))
     assert "No layouts." in text
     assert "<img" not in text
 

@@ -16,7 +16,7 @@ from lark.exceptions import LarkError
 from factory.apps.exports.iec.cell import cell, scan_time
 from factory.apps.exports.iec.structured_text import write
 from factory.apps.plc.driven import DrivenSupervisor, drive
-from factory.apps.plc.signals import Commands, Sensed
+from factory.apps.plc.signals import KEPT, Commands, Refusal, Refusals, Sensed
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
@@ -290,3 +290,13 @@ def test_a_plant_that_is_told_to_stop_stands() -> None:
     assert np.ptp(stood, axis=0).max() < 1e-5
     assert np.ptp(np.array([x for _, x in seen]), axis=0).max() > 0.1
     assert run.succeeded, run.verdict
+
+
+def test_refusals_fill_no_memory() -> None:
+    refusals = Refusals()
+    for n in range(KEPT + 7):
+        refusals.add(Refusal(float(n), 0, "no"))
+    assert (refusals.count, len(refusals.last)) == (KEPT + 7, KEPT)
+    assert [refusal.time for refusal in refusals.since(KEPT + 5)] == [KEPT + 5, KEPT + 6]
+    assert [refusal.time for refusal in refusals.since(0)] == [*range(7, KEPT + 7)]
+    assert refusals.since(refusals.count) == []

@@ -17,7 +17,7 @@ from factory.apps.deviations.deviation import ASKEW, KINDS, SLIPPED
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.recovery import recover
 from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
-from factory.apps.recovery.standing import Standing
+from factory.apps.recovery.standing import MotionHold
 from factory.apps.recovery.undo import undo
 from factory.engine.record.failures import Failures
 from factory.engine.simulation.request import RunRequest
@@ -407,7 +407,7 @@ def replays(made: Factory, events: Any) -> bool:
 BLIND: dict[str, tuple[type, str, Any, str]] = {
     "drop": (MujocoPlant, "lost", lambda plant: (), "jammed"),
     "bad_joint": (MujocoPlant, "residual", lambda plant, operation: 0.0, ""),
-    "dead": (Standing, "jammed", lambda standing, now, excused: [], ""),
+    "dead": (MotionHold, "jammed", lambda standing, now, excused: [], ""),
     "askew": (Senses, "is_askew", lambda *_: False, ""),
 }
 """A sense that is taken from the factory, and what is found in place of that; "" for nothing."""

@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,17 +18,22 @@ import pytest
 import factory
 from factory.apps.analyze import Timing, analyse
 from factory.apps.analyze.measured import logged_record
+from factory.apps.drawing.canvas import hexadecimal
+from factory.apps.drawing.tables import alike, differing
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.log import LogWriter, read_log
 from factory.apps.report import page, recording_of
 from factory.apps.report.drawings import data, floor_plan, labels_of, links
-from factory.apps.report.pace import fidelity, measured
+from factory.apps.report.pace import fidelity, measured, predicted
 from factory.apps.report.page import SCRIPTS, json_inside
-from factory.apps.report.sections import assembly_tree
+from factory.apps.report.scene import PLAIN
+from factory.apps.report.sections import assembly_tree, ending, heading
 from factory.apps.report.words import proof
+from factory.engine.record.ending import CutOff
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import STEADY
 from factory.engine.simulation.simulation import Simulation
+from factory.film.look import ROLES
 from factory.support.errors import InputError
 from factory.theory.problem.pag import PAG, Assembly
 from tests.command_line import Terminal
@@ -397,3 +403,56 @@ def test_a_fused_body_of_which_each_part_is_apart_is_drawn(run: Terminal, tmp_pa
     file.write_text(f"root = t; allow ( 0.01 ); t = mate ( s, c ); s = mate ( a, b ); {parts}\n")
     run("run", file, "--fuse", "--units", 1, "--log", log)
     assert run("report", log, "-o", tmp_path / "apart.html").status == 0
+
+
+# how it looks
+
+
+def test_roles_have_the_colours_of_films(made: Page, recording) -> None:
+    """In 3-D, on the plan, in charts and in the net."""
+    paints = recording.stage.paints
+    assert paints == {role: hexadecimal(colour) for role, colour in ROLES.items()}
+    text = page(recording)
+    assert all(f"--paint-{role}: {paint};" in text for role, paint in paints.items())
+    assert {*recording.stage.roles} == {"output", "carrier", "fed", "tool"}
+    for robot, role in enumerate(recording.stage.roles):
+        shapes = [t["shape"] for t in made.data["scene"]["things"] if t.get("robot") == robot]
+        colours = {
+            "#" + bytes(row).hex() for n in shapes for row in made.array(f"c{n}").reshape(-1, 3)
+        }
+        assert paints[role] in colours, (robot, role)
+
+
+def test_corners_have_the_finish_of_their_material(made: Page, recording) -> None:
+    m = recording.stage.drawn
+    known = {
+        (round(255 * max(0.0, float(m.mat_metallic[i]))), round(255 * float(m.mat_roughness[i])))
+        for i in range(m.nmat)
+        if m.mat_roughness[i] >= 0
+    } | {tuple(round(255 * v) for v in PLAIN)}
+    shapes = range(len(made.data["scene"]["alphas"]))
+    finishes = [made.array(f"m{n}").reshape(-1, 2) for n in shapes]
+    assert {tuple(row) for rows in finishes for row in rows.tolist()} <= known
+    assert len({tuple(row) for rows in finishes for row in rows.tolist()}) > 4
+    assert all(len(made.array(f"v{n}")) == 3 * len(finishes[n]) for n in shapes)
+
+
+def test_columns_of_equal_figures_are_folded(made: Page) -> None:
+    columns, rows = ("", "tools", "cycle", "relays"), [("a", "3", "1", "-"), ("b", "3", "2", "-")]
+    assert differing(rows) == [0, 2] and alike(columns, rows) == "tools 3, relays -"
+    assert differing(rows[:1]) == [0, 1, 2, 3] and alike(columns, rows[:1]) == ""
+    assert differing([]) == [] and alike(columns, []) == ""
+    assert "excluded none" in " ".join(made.words)
+
+
+def test_notes_are_amber_and_failures_red(recording) -> None:
+    """A cut-off run has failed; a reservation is a note."""
+    cut = CutOff(1.0, 1, 2, "Interrupted", "stopped by the user")
+    assert ending(cut).startswith('<p class="notice bad"')
+    run, plan, proved = measured(recording), predicted(recording), proof(recording.factory)
+    doubts = {"qualified": ("no hand holds 'x'",), "judged": True, "follows": True, "refines": True}
+    doubted = replace(recording)
+    doubted.__dict__["verdict"] = SimpleNamespace(**doubts)
+    cards = heading(doubted, run, plan, proved)
+    assert '<span class="doubt">1 <small>reservation</small></span>' in cards
+    assert 'class="bad"' not in cards

@@ -215,7 +215,10 @@ def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:
     assert done.status == 0, done.err
     assert document["robots"] == {"old": 23, "new": 21} and document["gone"] == ["r3", "r4"]
     assert document["pairs_inherited"] + document["pairs_computed"] == document["pairs"]
-    assert 'class="gone"' in picture.read_text()
+    drawn = picture.read_text()
+    for style, count in (("dot stays", 17), ("dot changed", 1), ("post", 11), ("gone-name", 2)):
+        assert drawn.count(f'class="{style}"') >= count, style
+    assert 'class="way"' not in drawn and ">r3<" in drawn
     plan = json.loads((out / "plan.json").read_text())
     assert plan["plan"]["names"][:3] == ["r1", "r2", "r5"]
     checked = spawn("check", str(out / "plan.json"), "--json")

@@ -23,7 +23,7 @@ from scipy import stats
 from factory.apps.sweep import Recipe, points, pool, read_axes, summarise
 from factory.apps.sweep.grid import Value
 from factory.apps.sweep.store import COLUMNS, Store
-from factory.apps.sweep.sweeping import run_local, sweep
+from factory.apps.sweep.sweeping import outcomes_of, sweep
 from factory.apps.sweep.work import FIGURES, Outcome, Runner
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -387,7 +387,7 @@ def test_a_killed_worker_loses_the_run_under_way_alone(
     recipe = recipe_of()
     deadly = Deadly(recipe.factory, recipe.product, recipe.fixed, mark=tmp_path / "mark")
     grid = list(points(read_axes(["seed=2,0,3,1,4:8"])))
-    found = {dict(o.point)["seed"]: o for o in run_local(deadly, grid, 2)}
+    found = {dict(o.point)["seed"]: o for o in outcomes_of(deadly, grid, 2)}
     assert sorted(found) == list(range(8))
     assert found[1].reason == "Killed the process died in 2 tries (exit status -9)"
     assert found[2].reason == "" and found[2].tries == 2
@@ -398,7 +398,7 @@ def test_workers_that_die_as_they_start_end_the_sweep() -> None:
     recipe = recipe_of()
     stillborn = Stillborn(recipe.factory, recipe.product, recipe.fixed)
     with pytest.raises(RunError, match=r"die as they start \(exit status 7\)"):
-        list(run_local(stillborn, list(points(read_axes(["seed=0:9"]))), 1))
+        list(outcomes_of(stillborn, list(points(read_axes(["seed=0:9"]))), 1))
 
 
 def children(pid: int) -> list[int]:

@@ -88,7 +88,10 @@ def export(
     output: Path | None,
     of: str,
 ) -> int:
-    """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
+    """Write a factory, a net or a LOG of a run for other tools.
+
+    FILE is a PAG, a net in PNML, or a LOG of `run --log`.
+    """
     from factory.api import Project, write_all
     from factory.apps.exports.writing import check_taken, exporter, read_source, takes_folder
     from factory.apps.exports.writing import export as exported

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     help="Draw each robot's speed and gain at random within ± this fraction.",
 )
 @shared.JOBS
+@shared.ON
 @click.option("-o", "--output", type=shared.OUT, help="Write the figures to this file, as JSON.")
 @click.option("--max-time", type=shared.SECONDS, help="Stop a run after this simulated time [s].")
 @shared.FLOOR
@@ -52,10 +53,11 @@ def fidelity(
     units: int | None,
     jitter: float,
     jobs: int | None,
+    on: str | None,
     output: Path | None,
     max_time: float | None,
 ) -> int:
-    """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
+    """Compare MuJoCo with the ideal world over the same seeds."""
     from factory.apps.fidelity import measure
     from factory.apps.sweep.pool import cores
     from factory.support.files import write_text
@@ -73,7 +75,8 @@ def fidelity(
             bar.show("running", finished, seeds)
 
         jobs = jobs or cores()
-        measured = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)
+        asked = range(seeds), units, jitter, settings, jobs
+        measured = measure(layout, *asked, done, max_time, on)
     document = measured.as_json()
     if output is not None:
         write_text(output, json.dumps(finite(document), indent=1) + "\n")

@@ -61,8 +61,11 @@ def import_(
     columns: tuple[str, ...],
     folders: tuple[Path, ...],
 ) -> int:
-    """Convert SOURCE to a PAG: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill
-    of materials with levels (.csv), or a folder with one of these."""
+    """Convert a model, tree or bill of materials to a PAG.
+
+    SOURCE is an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of materials with
+    levels (.csv), or a folder with one of these.
+    """
     from factory.api import write_all
     from factory.apps.importing import Options, import_product
     from factory.apps.importing.draft import Mates

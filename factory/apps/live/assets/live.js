@@ -112,7 +112,11 @@ class Acts {
         ['blocked', { do: 'block', part, blocked: true }, stopped],
       ]));
     }
-    if (!made.length) made.push(this.words('p', `Choose a robot to push it, slow it down${DATA.fails ? ', pause it or kill it' : ''}, or a part to block its feeder: in the picture, the net, the plan or the tree.`));
+    if (!made.length) {
+      made.push(this.words('p', `Choose a robot to push it, slow it down${DATA.fails ? ', pause it or kill it' : ''}, or a part to block its feeder; here or in any view.`));
+      made.push(this.choice('Robots', 'robot', DATA.robots.map((words, n) => [words, n])));
+      made.push(this.choice('Feeders', 'label', DATA.parts.map((words) => [words, DATA.labels.indexOf(words)])));
+    }
     const changes = [
       ...Object.entries(this.slowed).map(([n, factor]) => [`${DATA.robots[n]} at ${100 * factor} % ✕`, { do: 'slow', robot: Number(n), factor: 1 }]),
       ...this.blocked.map((label) => [`${label} blocked ✕`, { do: 'block', part: label, blocked: false }]),
@@ -123,6 +127,17 @@ class Acts {
       made.push(group);
     }
     this.panel.replaceChildren(...made);
+  }
+
+  // Buttons that select.
+  choice(name, kind, choices) {
+    const group = this.group(name, []);
+    for (const [words, number] of choices) {
+      const button = this.words('button', words);
+      button.dataset[kind] = number;
+      group.append(button);
+    }
+    return group;
   }
 
   // A push goes on for as long as the button is held.
@@ -160,7 +175,7 @@ class Acts {
   }
 }
 
-const LINES = 11;
+const LINES = 16;
 const FAILURES = 4;
 
 // The last transitions, the newest first; the last failures among them stay longer.

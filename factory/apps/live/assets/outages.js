@@ -116,7 +116,7 @@ class Outages {
 
   inSpace(replay) {
     replay.scene.remove(...(this.discs || []));
-    this.red ||= new THREE.MeshLambertMaterial({ color: 0, emissive: ZONE, transparent: true, opacity: 0.4, depthWrite: false });
+    this.red ||= new THREE.MeshStandardMaterial({ color: 0, emissive: ZONE, transparent: true, opacity: 0.4, depthWrite: false });
     this.round ||= round();
     this.discs = this.now.zones.map(([x, y, radius]) => {
       const disc = new THREE.Mesh(this.round, this.red);

@@ -46,9 +46,10 @@ def view(
     expose: bool,
     paused: bool,
 ) -> int:
-    """Run FILE.pag endlessly in a browser, where you can pause it, push robots and block feeders.
+    """Run FILE.pag endlessly, and show it in a browser.
 
-    With --spares or --faults the run recovers from failures: you can pause or kill robots."""
+    There you can pause it, push robots and block feeders. With --spares or --faults the run
+    recovers from failures: you can pause or kill robots."""
     from factory.api import Simulation
     from factory.apps.live import Server, Session
     from factory.apps.live.page import page

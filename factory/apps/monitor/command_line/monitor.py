@@ -20,8 +20,10 @@ from factory.support.console import emit, say
 @STRICT
 @OUTPUT
 def monitor(file: Path, lenient: bool, strict: bool, out: OutputOptions) -> int:
-    """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
-    something failed, from those between failures, and from what fired and was undone.
+    """Judge the run in a LOG against its net, from its states.
+
+    `run --log` writes a LOG. Where something failed, it is judged from the states between failures,
+    and from what fired and was undone.
 
     The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
     net says, or that was cut off before its units were made, for a LOG that is not that of its PAG

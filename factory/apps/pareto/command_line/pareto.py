@@ -13,7 +13,7 @@ import click
 from factory.api import Diagnostic, usage_error
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
-from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, SECONDS, SOURCE
+from factory.commands.options import FLOOR, MOTION, ON, OUT, OUTPUT, SECONDS, SOURCE
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -48,13 +48,14 @@ PAGE_NAME = "pareto.html"
     "--seconds",
     "limit",
     type=SECONDS,
-    help="Time limit of the search [s]; a search that it cuts short says so.",
+    help="Time limit of the search [s]; a message says if it was reached.",
 )
 @click.option(
     "--layouts/--no-layouts",
     default=True,
     help="Lay out and certify the points (default), or estimate them.",
 )
+@ON
 @FLOOR
 @MOTION
 @OUTPUT
@@ -62,10 +63,13 @@ def pareto(
     options: ProjectOptions,
     out: OutputOptions,
     trials: int,
+    on: str | None,
     output: Path | None,
     layouts: bool,
 ) -> int:
-    """Find the Pareto-optimal factories for FILE.pag in robots, cycle time and floor area.
+    """Find the Pareto-optimal factories for FILE.pag.
+
+    The objectives are the numbers of robots, the cycle time and the floor area.
 
     Ctrl-C ends the search; the points found until then are printed and written. The exit status
     is 1 if a point that was run fails, or differs from its prediction by more than 2 %."""
@@ -81,7 +85,7 @@ def pareto(
     project = options.project(out.silent)
     warnings = announced(project.warnings, out)
     effort = Effort(layouts, options.effort, options.limit or inf, options.branches())
-    front, stopped = _found(project, effort, trials, out)
+    front, stopped = _found(project, effort, trials, out, on)
     commands, files = _written(front, project, output)
     if out.as_json:
         points = zip(front.points, commands, strict=True)
@@ -100,12 +104,13 @@ def pareto(
 
 
 def _found(
-    project: Project, effort: Effort, trials: int, out: OutputOptions
+    project: Project, effort: Effort, trials: int, out: OutputOptions, on: str | None
 ) -> tuple[ParetoFront, StoppedError | None]:
     """The front, with the runs of `trials` of its points; and the error of an interruption, if the
     user stopped the search after a first point."""
     from factory.apps.pareto import FrontSweep
     from factory.apps.pareto.front import tried
+    from factory.apps.sweep.workers import each_of
     from factory.support.progress import StepBar
 
     front = None
@@ -119,9 +124,11 @@ def _found(
             sweep.look()
             front = sweep.front()
             numbers = front.spread(trials)
-            for done, number in enumerate(numbers):
+            projects = [front.points[number].project for number in numbers]
+            bar.show("running in both worlds", 0, len(numbers))
+            for done, (number, trial) in enumerate(each_of(tried, projects, on), 1):
+                front = front.with_trial(numbers[number], trial)
                 bar.show("running in both worlds", done, len(numbers))
-                front = front.with_trial(number, tried(front.points[number].project))
         except KeyboardInterrupt:
             front = front or sweep.front()
             if not front.points:
@@ -145,7 +152,7 @@ def _written(
         return [None] * len(front.points), []
     commands = commands_of(front, folder)
     plans = floor_plans(front, folder)
-    page = front_page(front, commands, plans, folder)
+    page = front_page(front, commands)
     files = {folder / PAGE_NAME: page.encode(), **point_files(front, folder), **plans}
     own_names(folder, files)
     write_all(files)
@@ -166,8 +173,9 @@ def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
     if front.written is not None:
         say(f"as written: {front.written}")
     say(f"lower bound: {front.least.total} robots, tools included")
-    if front.unproved:
-        say(front.unproved)
+    for words in (front.unproved, front.ending):
+        if words:
+            say(words)
     for point in front.points:
         for failure in point.trial.failures if point.trial else ():
             print(f"{point.robots} robots: the run failed: {failure}", file=sys.stderr)
@@ -175,8 +183,7 @@ def _print(front: ParetoFront, commands: Sequence[str | None]) -> None:
 
 def _looked_at(front: ParetoFront) -> str:
     laid_out = f", {front.laid_out} layouts" if front.laid_out else ""
-    rest = "" if front.complete else "; the search is incomplete (--effort, --seconds)"
-    return f"{front.estimated} estimates{laid_out}{rest}"
+    return f"{front.estimated} estimates{laid_out}"
 
 
 def _row(point: FrontPoint) -> list[str]:

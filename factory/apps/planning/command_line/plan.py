@@ -98,10 +98,12 @@ def plan(
     look: bool,
     folders: tuple[Path, ...],
 ) -> int:
-    """Plan the assembly of SOURCE, whose parts are in their places in the finished product, and
-    write the assembly tree as a PAG with its meshes. SOURCE is a folder of meshes, a file with
+    """Plan the assembly of parts that are given in place.
+
+    The assembly tree is written as a PAG with its meshes. SOURCE is a folder of meshes, a file with
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
-    to be ignored."""
+    to be ignored; all parts are where they are in the finished product.
+    """
     from factory.apps.few_robots.sharing import with_lines
     from factory.apps.importing.draft import file_stem
     from factory.apps.planning.outcome import write_planned

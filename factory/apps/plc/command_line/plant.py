@@ -35,7 +35,7 @@ SCAN = 10
     "--pace",
     type=click.FloatRange(0.01, 100.0),
     default=1.0,
-    help="Simulated seconds in a second.",
+    help="Simulated seconds per second of real time.",
 )
 @LENIENT
 @FLOOR
@@ -51,11 +51,11 @@ def plant(
     scan: int,
     pace: float,
 ) -> int:
-    """Serve the plant of FILE.pag by OPC UA, for a PLC to drive, until its products are made.
+    """Serve the plant of FILE.pag to a PLC, by OPC UA.
 
-    The controller writes targets, grips, jobs and a heartbeat, without which all axes stand. What
-    the net or the reach of a grip does not allow is refused by name. `export --format st` writes
-    a controller."""
+    It ends when its products are made. The controller writes targets, grips, jobs and a heartbeat,
+    without which all axes stand. What the net or the reach of a grip does not allow is refused by
+    name. `export --format st` writes a controller."""
     from factory.api import Simulation
     from factory.apps.plc.opcua import OpcuaPlant, check_plant
     from factory.apps.runs.running import carry_on

@@ -65,8 +65,13 @@ class Heap:
 
 
 class Fallen:
-    """What lies about in a world: `heaps`; `closed`: robots (index) that could touch something
-    outside its bin; `binned`: number of heaps that fell into a bin."""
+    """What lies about in a world.
+
+    Attributes:
+        heaps: what has fallen together, each until it is cleared away.
+        closed: robots (index) that could touch something outside its bin.
+        binned: number of heaps that fell into a bin.
+    """
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._swept = world, SweptFloor.of(world.model.layout)

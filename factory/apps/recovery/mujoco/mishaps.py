@@ -25,8 +25,13 @@ SETTLES = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """The `welds` of a hand in which an input has slipped, and all `bodies` of the operation, which
-    press on each other."""
+    """A slip of an input in its hand.
+
+    Attributes:
+        robot: the robot (index).
+        welds: the welds of its hand.
+        bodies: all bodies of the operation, which press on each other.
+    """
 
     robot: int
     welds: tuple[int, ...]
@@ -34,11 +39,16 @@ class Slip:
 
 
 class Mishaps:
-    """The faults of a world. `slips`: by operation under way (index); `opened`: robots (index)
-    whose hands have opened undetected; `bad`: defective bodies, and whether the defect is hidden
-    from feeders' cameras; `unseen`: bodies not yet examined by a camera, with their fault; `askew`:
-    bodies that lie askew in a feeder, with its code and pad (a geom); `gone`: faults that no camera
-    can find any more."""
+    """The faults of a world, as deviations have caused them.
+
+    Attributes:
+        slips: by operation under way (index), the input that has slipped.
+        opened: robots (index) whose hands have opened undetected.
+        bad: by defective body, whether the defect is hidden from feeders' cameras.
+        unseen: by body that no camera has examined yet, its fault.
+        askew: by body that lies askew in a feeder, the code and the pad (a geom) of the feeder.
+        gone: faults that no camera can find any more.
+    """
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen = world, fallen
@@ -54,7 +64,7 @@ class Mishaps:
         """Open a robot's hand."""
         parts = self._world.parts
         held = parts.holdings.hand(robot)
-        parts.welds.loose([parts.holdings.weld[robot_code(robot), label] for label in held])
+        parts.welds.open([parts.holdings.weld[robot_code(robot), label] for label in held])
         parts.welds.write()
         self._fallen.watch(held.values())
         self.opened.add(robot)
@@ -65,7 +75,7 @@ class Mishaps:
         welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
         for weld in welds:
             place = self._world.m.eq_data[weld, 3:10]
-            self._world.parts.welds.bend(weld, place + metres * UP)
+            self._world.parts.welds.offset(weld, place + metres * UP)
         bodies = tuple(body for r in operation.robots for body in holdings.hand(r).values())
         self.slips[operation.index] = Slip(robot, welds, bodies)
         self._fallen.watch(bodies)
@@ -74,7 +84,7 @@ class Mishaps:
         """Put slipped inputs of operations (index) back into place."""
         for number in {*operations} & self.slips.keys():
             slip = self.slips.pop(number)
-            self._world.parts.welds.straighten(slip.welds)
+            self._world.parts.welds.end_offset(slip.welds)
             self._settling.append((self._world.time + SETTLES, slip.bodies))
 
     def fresh(self) -> Sequence[tuple[str, int]]:
@@ -103,7 +113,7 @@ class Mishaps:
         mujoco.mju_mulQuat(pose, slider, turn)
         aside = np.zeros(3)
         mujoco.mju_rotVecQuat(aside, np.array([0, fault.way, 0]), slider)
-        parts.welds.bend(weld, np.array([place[0], place[1] + fault.way, place[2], *turn]))
+        parts.welds.offset(weld, np.array([place[0], place[1] + fault.way, place[2], *turn]))
         parts.welds.turn(body, pose, aside)
         self._fallen.watch([body])
         pad = int(m.body_geomadr[m.eq_obj1id[weld]])

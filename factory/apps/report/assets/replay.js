@@ -2,10 +2,11 @@
 // The 3-D replay, drawn with three.js, and the pictures of parts in the tree.
 
 const DARK = matchMedia('(prefers-color-scheme: dark)');
-const SIDE = new THREE.Vector3(-0.62, -1, 0.78).normalize();
+const SIDE = new THREE.Vector3(...DATA.scene.view).normalize();
 const ABOVE = new THREE.Vector3(0, -0.001, 1).normalize();
 
-// Geometry of a shape, its colours linear, its normals smooth but at edges.
+// Geometry of a shape, its colours linear, its normals smooth but at edges; of each corner the
+// metallic share and the roughness.
 function shaped(array, number) {
   const geometry = new THREE.BufferGeometry();
   const colours = Float32Array.from(array(`c${number}`), (byte) => {
@@ -14,6 +15,7 @@ function shaped(array, number) {
   });
   geometry.setAttribute('position', new THREE.BufferAttribute(array(`v${number}`), 3));
   geometry.setAttribute('color', new THREE.BufferAttribute(colours, 3));
+  geometry.setAttribute('finish', new THREE.BufferAttribute(array(`m${number}`), 2, true));
   geometry.setIndex(new THREE.BufferAttribute(array(`f${number}`), 1));
   return THREE.toCreasedNormals(geometry, 0.6);
 }
@@ -24,12 +26,24 @@ class Paints {
     this.made = new Map();
   }
 
+  // A material that has the finish of its corners.
+  static finished(options) {
+    const made = new THREE.MeshStandardMaterial({ vertexColors: true, ...options });
+    made.onBeforeCompile = (shader) => {
+      shader.vertexShader = `attribute vec2 finish; varying vec2 vFinish;\n${shader.vertexShader}`
+        .replace('#include <begin_vertex>', '#include <begin_vertex>\nvFinish = finish;');
+      shader.fragmentShader = `varying vec2 vFinish;\n${shader.fragmentShader}`
+        .replace('#include <metalnessmap_fragment>', 'float metalnessFactor = vFinish.x;')
+        .replace('#include <roughnessmap_fragment>', 'float roughnessFactor = vFinish.y;');
+    };
+    return made;
+  }
+
   of(alpha, state) {
     const key = `${alpha} ${state}`;
     if (!this.made.has(key)) {
-      const opacity = state === 'faded' ? Math.min(alpha, 0.22) : alpha;
-      this.made.set(key, new THREE.MeshLambertMaterial({
-        vertexColors: true,
+      const opacity = state === 'faded' ? alpha / 2 : alpha;
+      this.made.set(key, Paints.finished({
         opacity,
         transparent: opacity < 1,
         emissive: state === 'lit' ? 0xc2255c : 0x000000,
@@ -40,9 +54,15 @@ class Paints {
   }
 }
 
-function lights(scene) {
-  scene.add(new THREE.HemisphereLight(0xffffff, 0xa8a8b4, 1.75));
-  const sun = new THREE.DirectionalLight(0xffffff, 1.7);
+// The light of a studio, from which metals and edges have their highlights, and of a sun.
+function lights(renderer, scene) {
+  const studio = new THREE.PMREMGenerator(renderer);
+  scene.environment = studio.fromScene(new THREE.RoomEnvironment(), 0.04).texture;
+  scene.environmentIntensity = 0.62;
+  scene.environmentRotation.x = Math.PI / 2;
+  studio.dispose();
+  renderer.toneMapping = THREE.NeutralToneMapping;
+  const sun = new THREE.DirectionalLight(0xfff6ea, 2.1);
   scene.add(sun, sun.target);
   return sun;
 }
@@ -158,8 +178,8 @@ class Replay {
     const box = new THREE.Box3().setFromPoints(this.points);
     const [middle, size] = [box.getCenter(new THREE.Vector3()), box.getSize(new THREE.Vector3())];
     const radius = size.length() / 2;
-    this.sun = lights(this.scene);
-    this.sun.position.set(middle.x - radius * 0.7, middle.y - radius * 0.5, radius * 2.4);
+    this.sun = lights(this.renderer, this.scene);
+    this.sun.position.set(middle.x - radius * 1.6, middle.y - radius * 0.7, radius * 2.3);
     this.sun.target.position.set(middle.x, middle.y, 0);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(2048, 2048);
@@ -236,7 +256,7 @@ class Replay {
   }
 
   repaint() {
-    this.scene.background = new THREE.Color(DARK.matches ? 0x2a2e34 : 0xe6e6e8);
+    this.scene.background = new THREE.Color(DARK.matches ? 0x2a2e34 : 0xe3e5e9);
     this.grid.material.color.set(DARK.matches ? 0x363b43 : 0xd4d5d8);
     this.draw();
   }
@@ -290,8 +310,8 @@ async function pictures(shapes) {
   renderer.setSize(132, 114, false);
   const [scene, camera] = [new THREE.Scene(), new THREE.PerspectiveCamera(24, 132 / 114, 0.01, 100)];
   camera.up.set(0, 0, 1);
-  lights(scene).position.set(-1, -0.8, 2);
-  const paint = new THREE.MeshLambertMaterial({ vertexColors: true });
+  lights(renderer, scene).position.set(-1, -0.8, 2);
+  const paint = Paints.finished({});
   const bodies = new Map();
   for (const thing of DATA.scene.things) if (thing.copy) bodies.set(thing.label, thing);
   for (const [label, slot] of slots) {

@@ -1,6 +1,10 @@
 'use strict';
 // The drawings: floor plan and net, moved with the time.
 
+// The size of the net's smallest letters, and that of the smallest ones that can be read [px].
+const LETTERS = 9.5;
+const LEAST = 9;
+
 class Floor {
   constructor(svg, motion) {
     this.svg = svg;
@@ -30,7 +34,7 @@ class Net {
     document.getElementById('net-in').addEventListener('click', () => this.zoom(this.scale * 1.3));
     document.getElementById('net-out').addEventListener('click', () => this.zoom(this.scale / 1.3));
     document.getElementById('net-fit').addEventListener('click', () => this.fit(0));
-    this.fit(0.7);
+    this.fit(LEAST / LETTERS);
   }
 
   // The whole net, but no smaller than `least`.
@@ -46,6 +50,8 @@ class Net {
     const [x, y] = [panel.scrollLeft + panel.clientWidth / 2, panel.scrollTop + panel.clientHeight / 2];
     this.svg.setAttribute('width', this.width * kept);
     this.svg.setAttribute('height', this.height * kept);
+    this.svg.style.setProperty('--least', `${LEAST / kept}px`);
+    this.svg.classList.toggle('far', kept * LETTERS < LEAST - 0.01);
     panel.scrollLeft = (x * kept) / this.scale - panel.clientWidth / 2;
     panel.scrollTop = (y * kept) / this.scale - panel.clientHeight / 2;
     this.scale = kept;

@@ -26,25 +26,31 @@ from factory.support.console import emit, say
 @click.option(
     "--units",
     type=click.IntRange(1, 10_000),
-    default=4,
-    help="Number of products to make; the cycle time is measured from 4 on.",
+    help="Number of products to make (default: as many as it takes to measure a cycle time).",
 )
 @shared.DRAW
 @shared.WIP
 @click.option("--max-time", type=shared.SECONDS, help="Stop after this simulated time [s].")
 @shared.LENIENT
 @shared.STRICT
-@shared.RUNS
+@shared.gathered(RunOptions, "asked", but="units")
 @shared.FLOOR
 @shared.RELAY
 @shared.MOTION
 @shared.OUTPUT
-def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
-    """Write one HTML page about a run of FILE.pag, or about the run in a LOG of `run --log`.
+def report(
+    options: ProjectOptions,
+    asked: RunOptions,
+    out: OutputOptions,
+    output: Path,
+    units: int | None,
+) -> int:
+    """Write one HTML page about a run.
 
-    The page is always written. The exit status is 1 if the run failed, or was cut off before its
-    units were made; --lenient ignores what its bodies do, and with --strict a run whose success is
-    qualified fails."""
+    Runs FILE.pag, or takes the run in a LOG of `run --log`. The page is always written. The exit
+    status is 1 if the run failed, or was cut off before its units were made; --lenient ignores what
+    its bodies do, and with --strict a run whose success is qualified fails."""
+    from factory.api import steady_from
     from factory.apps.log import is_log
     from factory.apps.report.page import report_on
     from factory.support.files import write_text
@@ -58,6 +64,7 @@ def report(options: ProjectOptions, asked: RunOptions, out: OutputOptions, outpu
     else:
         asked.check_combination()
         project = options.project(out.silent)
+        asked = replace(asked, units=units or steady_from(project.plain.period))
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)
     write_text(output, made.text)

@@ -18,7 +18,7 @@ from factory.support.settings import MOST_UNITS
 @click.argument("one", type=PATH, shell_complete=pag_files)
 @click.argument("other", type=PATH, shell_complete=pag_files)
 @TEMPLATES
-@click.option("--count", default="1:1", help="How many of each are made in a period, as 3:1.")
+@click.option("--count", default="1:1", help="Units of each product in a period, for example 3:1.")
 @click.option("-o", "output", type=OUT, required=True, help="The file to write.")
 @OUTPUT
 def mix(
@@ -29,7 +29,10 @@ def mix(
     output: Path,
     out: OutputOptions,
 ) -> int:
-    """Write ONE.pag and OTHER.pag as one product family, in which what is equal is written once."""
+    """Write two products as one family.
+
+    What ONE.pag and OTHER.pag have in common is written once.
+    """
     from factory.api import load_pag, write_all, write_pag
     from factory.apps.revise.family import family
     from factory.pipeline import all_templates

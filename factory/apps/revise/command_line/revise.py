@@ -28,10 +28,14 @@ if TYPE_CHECKING:
     "--pin",
     type=click.Choice(["all", "hands", "none"]),
     default="all",
-    help="What of OLD's layout is kept, or less where no layout has that.",
+    help="What to keep of OLD's layout, as far as possible.",
 )
-@click.option("--afresh", is_flag=True, help="Also say the cycle time of a layout made afresh.")
-@click.option("--live", is_flag=True, help="Also lay out a floor for both, to change during a run.")
+@click.option(
+    "--afresh", is_flag=True, help="Also give the cycle time of a layout that keeps nothing."
+)
+@click.option(
+    "--live", is_flag=True, help="Also lay out a floor for both products, to switch during a run."
+)
 @click.option("--picture", type=OUT, help="Draw what stays on NEW's floor: OUT.svg.")
 @OUTPUT
 def revise(
@@ -45,8 +49,10 @@ def revise(
     picture: Path | None,
     out: OutputOptions,
 ) -> int:
-    """Say what stays of the factory of OLD.pag in that of NEW.pag, and lay it out so that most
-    does. OLD may be a plan.json.
+    """Revise a factory for a new product, and keep most of it.
+
+    Reports what can stay of the factory of OLD.pag, or of a plan.json, and lays out NEW.pag to keep
+    as much as possible.
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
@@ -85,10 +91,7 @@ def revise(
         write_all(texts)
         files += map(str, texts)
     if picture is not None:
-        from factory.apps.revise.revision_picture import draw_revision
-
-        layouts, moved = (before.layout, revision.new.layout), revision.inheritance.shift
-        write_all({picture: draw_revision(revision.title, layouts, revision.kept, moved).encode()})
+        write_all({picture: revision.drawing.encode()})
         files.append(str(picture))
     if out.as_json:
         also = {"live": change.as_json()} if change else {}

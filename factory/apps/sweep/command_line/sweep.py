@@ -37,6 +37,7 @@ class SweepOptions:
     max_time: float | None
     fuse: bool | None
     jobs: int | None
+    on: str | None
     retry: bool
 
 
@@ -51,6 +52,7 @@ class SweepOptions:
 )
 @click.option("-o", "--output", "database", type=shared.OUT, help="Database of the results.")
 @shared.JOBS
+@shared.ON
 @click.option("--retry", is_flag=True, help="Repeat failed runs.")
 @click.option("--summary", is_flag=True, help="Print means, deviations and confidence intervals.")
 @click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As for `run`.")
@@ -75,10 +77,10 @@ def sweep(
     vary: tuple[str, ...],
     summary: bool,
 ) -> int:
-    """Run FILE.pag for every combination of the varied values, and keep the results in SQLite.
+    """Run FILE.pag for all combinations of varied values.
 
-    Called again, the sweep continues where it stopped. `factory sweep RESULTS --summary`
-    summarises the results so far, also during a sweep.
+    The results are kept in SQLite. Called again, the sweep continues where it stopped. `factory
+    sweep RESULTS --summary` summarises the results so far, also during a sweep.
     """
     document: dict[str, Any] = {}
     failed = False
@@ -125,7 +127,7 @@ def _carry_out(
     recipe = recipe_of(project, axes, asdict(runs), runs.max_time, runs.fuse)
     warnings = announced(project.product.warnings, out)
     jobs = runs.jobs or cores()
-    return sweep(recipe, axes, database, jobs, runs.retry, out.silent), warnings
+    return sweep(recipe, axes, database, jobs, runs.retry, out.silent, runs.on), warnings
 
 
 def _print(tally: Tally, database: Path) -> None:

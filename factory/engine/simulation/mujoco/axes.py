@@ -18,10 +18,17 @@ from factory.theory.problem.robot_bodies import LIFT_JOINT
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Across:
-    """The second slides of robots with bent guidepaths: `axes` (b,): their carriages; `ways`: their
-    curves; `row` (axes,): the index of an axis in `axes`, -1 for none. Each (b,): `qpos`, `dof`,
-    `actuator`: addresses in the engine's model. `latest`: the last arc lengths and speeds, by the
-    state that they belong to."""
+    """The second slides of b robots whose guidepaths have bends.
+
+    Attributes:
+        axes: their carriages (b,).
+        ways: the curves of their guidepaths.
+        row: the index of an axis in `axes`, -1 for none (axes,).
+        qpos: addresses of the slides' positions in the engine's data (b, 2).
+        dof: addresses of their speeds (b, 2).
+        actuator: the drives of the second slides (b,).
+        latest: the last arc lengths and speeds, by the state that they belong to.
+    """
 
     axes: Index
     ways: Ways
@@ -75,11 +82,18 @@ class Axes:
     """The slides of robots and of the outfeed: carriages in order, then lifts, then the outfeed's
     tray and the shutter of its shed.
 
-    Each (axes,): `qpos`, `dof`, `body`, `tree`, `actuator`: addresses in the engine's model.
-    `lift`: the axis of a robot's lift, by the robot (index); `across`: the second slides of robots
-    whose guidepaths have bends; `inertia` (axes,): what a load of 1 kg adds to what an axis moves:
-    1 kg, or the moment of inertia [kg m²] of one that turns about the vertical, an angle [rad];
-    `heads` (axes,): what lifts bear without payload, 0 of other axes [kg].
+    Attributes:
+        qpos: addresses of positions in the engine's data (axes,).
+        dof: addresses of speeds (axes,).
+        body: the bodies that they move (axes,).
+        tree: their kinematic trees (axes,).
+        actuator: their drives (axes,).
+        lift: by robot (index), the axis of its lift.
+        across: the second slides of robots whose guidepaths have bends.
+        inertia: what a load of 1 kg adds to what an axis moves (axes,): 1 kg, or the moment of
+            inertia [kg m²] for one that turns about the vertical, whose position is an angle
+            [rad].
+        heads: mass that lifts bear without payload, 0 for other axes (axes,) [kg].
     """
 
     qpos: Index
@@ -117,7 +131,7 @@ class Axes:
         return cls(address, dof, body, m.body_treeid[body], actuator, lift, across, inertia, heads)
 
     @property
-    def turns(self) -> Truth:
+    def is_rotary(self) -> Truth:
         """Whether each axis is a rotation about the vertical (axes,)."""
         return np.asarray(self.inertia != 1.0)
 

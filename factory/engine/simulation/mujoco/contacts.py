@@ -31,13 +31,20 @@ LAST = 2**32 - 1
 
 
 class ContactMasks:
-    """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
+    """The contact masks of a model's parts, by their holders.
 
-    `code` and `unit` (nbody,): the holder of each part's body, or the code of a holder itself
-    (`own`), and the unit that a part belongs to, -1 for none. `trunk` (nbody,): what a shell is of.
-    `solid`: the geoms of each part's body, and of its shells, that collide. `fresh`: holders that
-    have been given something. `apart`: pairs of parts, each with the body that it is of, that do
-    not collide where they are of one unit.
+    Args:
+        arrays: the arrays of the model.
+        bodies: by label, the bodies of its copies (copies,).
+        apart: pairs of parts, each with the body that it is of, that do not collide where they
+            are of one unit.
+
+    Attributes:
+        code: the holder of each part's body, or the code of a holder itself (`own`) (nbody,).
+        unit: the unit that a part belongs to, -1 for none (nbody,).
+        trunk: the body that a shell is of (nbody,).
+        solid: by body, the geoms that collide, also of its shells.
+        fresh: holders that have been given something.
     """
 
     def __init__(

@@ -34,9 +34,14 @@ whether some axis may be at its goal then."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """The references of n axes: positions `x` [m] and speeds `v` [m/s] (ticks + 1, n) at the ends
-    of ticks; the `setpoints` (n, samples, 3) of their drives; whether it ends `near` a goal. It is
-    near one at its end only."""
+    """The references of n axes for some ticks ahead.
+
+    Attributes:
+        x: positions at the ends of ticks (ticks + 1, n) [m].
+        v: speeds there (ticks + 1, n) [m/s].
+        setpoints: of their drives (n, samples, 3).
+        near: whether it ends near a goal; before its end it never is.
+    """
 
     x: Array
     v: Array

@@ -29,8 +29,15 @@ from factory.theory.plant.operation import Operation
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A feeder's outlet: label, robot (index) that takes its parts, code of the feeder, and
-    positions of the part with the slider down and up."""
+    """The outlet of a feeder.
+
+    Attributes:
+        label: the label of its parts.
+        robot: the robot (index) that takes them.
+        code: the feeder's code as a holder.
+        down: position of a part with the slider down [m].
+        up: position of a part with the slider up [m].
+    """
 
     label: str
     robot: int
@@ -40,9 +47,14 @@ class Station:
 
 
 class Feeders:
-    """The feeders of a factory, by outlet (n,). `counts`: firing counts at the start of the run.
-    `lacking`: labels of parts that robots wait for; `due`: the time by which such a part must come
-    to be in time [s]. `back`: withdrawn parts."""
+    """The feeders of a factory, by outlet (n,).
+
+    Attributes:
+        supply: which units need parts.
+        back: withdrawn parts.
+        lacking: labels of parts that robots wait for.
+        due: the time by which such a part must come to be in time [s].
+    """
 
     def __init__(
         self,
@@ -226,7 +238,7 @@ class Feeders:
 
     def stay_clear(self, robot: int) -> None:
         """Let the next part of a robot (index) come down only when the robot is out of the way."""
-        self._passing.come_clear(robot)
+        self._passing.require_clear(robot)
 
     def _take_back(self) -> None:
         """Move sliders with withdrawn parts up, and release these out of sight."""

@@ -24,8 +24,14 @@ NOTHING: Mapping[str, int] = MappingProxyType({})
 
 
 class HeldPart(NamedTuple):
-    """A part in the factory: its `label`, the `unit` that it is for, and the code of its `holder`:
-    a robot, the tray or a feeder; NOBODY while it falls or lies about."""
+    """A part in the factory.
+
+    Attributes:
+        label: its label.
+        unit: the unit that it is for.
+        holder: the code of its holder: a robot, the tray or a feeder; NOBODY while it falls or
+            lies about.
+    """
 
     label: str
     unit: int
@@ -33,12 +39,16 @@ class HeldPart(NamedTuple):
 
 
 class Holdings:
-    """The parts of a factory, by body. Those in no unit are to spare, parked out of sight.
+    """The parts of a factory by body, each with its holder. Those in no unit are spares, parked out
+    of sight.
 
-    `body[label]`: all bodies of a label; `free[label]`: those to spare, the next first. `weld`:
-    what a holder, by its code, holds a label by. `changes`: how often something has changed hands;
-    `returns`: how often something has been put away. `parking`: the weld that parks a body, and
-    where [m].
+    Attributes:
+        body: by label, all bodies (copies,).
+        free: by label, the bodies to spare, the next first.
+        weld: by the code of a holder and a label, the weld that holds such a part there.
+        parking: by body, the weld that parks it, and the position of that [m].
+        changes: how often a part has changed its holder.
+        returns: how often a part has been parked.
     """
 
     def __init__(
@@ -58,7 +68,7 @@ class Holdings:
         }
         for each in self.parking:
             self._hide(each)
-        self._welds.loose(w for (holder, _), w in self.weld.items() if holder >= self._tray)
+        self._welds.open(w for (holder, _), w in self.weld.items() if holder >= self._tray)
 
     def __contains__(self, part: tuple[str, int]) -> bool:
         return part in self._present
@@ -113,18 +123,18 @@ class Holdings:
     def take(self, label: str, unit: int, holder: int) -> int:
         """Give a spare part to a holder (code), for a unit. Returns its body."""
         body = self.free[label].popleft()
-        self._welds.loose([self.parking[body][0]])
+        self._welds.open([self.parking[body][0]])
         self._enter(body, HeldPart(label, unit, NOBODY))
-        self._switch(body, holder)
-        self._welds.join({self.weld[holder, label]: body})
+        self._set_holder(body, holder)
+        self._welds.close({self.weld[holder, label]: body})
         return body
 
     def move(self, bodies: Iterable[int], holder: int) -> None:
         """Hand bodies over to a holder (code). The gaps of its grips are measured."""
         for body in [*bodies]:
             self._let_go(body)
-            self._switch(body, holder)
-            self._welds.grip({self.weld[holder, self._of[body].label]: body})
+            self._set_holder(body, holder)
+            self._welds.close_and_measure({self.weld[holder, self._of[body].label]: body})
 
     def drop(self, holder: int) -> dict[str, int]:
         """Release all bodies of a holder (code), which fall; returns them by label. They collide
@@ -160,11 +170,11 @@ class Holdings:
         del self._present[label, unit]
         self._welds.masks.leave(label, body)
 
-    def _switch(self, body: int, holder: int) -> None:
+    def _set_holder(self, body: int, holder: int) -> None:
         self.changes += 1
         holding = self._of[body] = self._of[body]._replace(holder=holder)
         self._held.setdefault(holder, {})[holding.label] = body
-        self._welds.hold([body], holder)
+        self._welds.set_holder([body], holder)
 
     def _let_go(self, body: int) -> None:
         """Release a body from its holder."""
@@ -175,14 +185,14 @@ class Holdings:
         del self._held[holder][label]
         if not self._held[holder]:
             del self._held[holder]
-        self._welds.loose([self.weld[holder, label]])
+        self._welds.open([self.weld[holder, label]])
         self._of[body] = self._of[body]._replace(holder=NOBODY)
 
     def _hide(self, body: int) -> None:
         weld, place = self.parking[body]
         self._welds.place(body, place)
-        self._welds.hold([body], NOBODY)
-        self._welds.join({weld: body})
+        self._welds.set_holder([body], NOBODY)
+        self._welds.close({weld: body})
 
 
 def _welds(m: mujoco.MjModel, model: Model) -> dict[tuple[int, str], int]:

@@ -20,8 +20,15 @@ from factory.support.engine import mujoco
 
 
 class Onsets:
-    """`pairs`: the pairs of geoms, by name, in the order of time; `begun`: time of the first onset
-    [s]. `name` gives a geom's name."""
+    """The contacts that began, in the order of time.
+
+    Args:
+        name: gives the name of a geom, by number.
+
+    Attributes:
+        pairs: the pairs of geoms that came to touch, by name.
+        begun: time of the first [s]; None while there was none.
+    """
 
     def __init__(self, name: Callable[[int], str]) -> None:
         self.pairs: list[tuple[str, str]] = []
@@ -43,10 +50,16 @@ class Onsets:
 
 
 class Inspection:
-    """Keeps the worst figures of a run. Contacts are inspected after every step of the engine.
-    `joining`: for each operation under way (index) the unit whose inputs it joins. `onsets`:
-    unintended contacts; `pressing`: intended ones. `residual` [m]: largest position error of a
-    weld. `error`: that of a product, None before the first. `soundness`: of the engine's model."""
+    """The worst figures of a run so far. Contacts are inspected after every step of the engine.
+
+    Attributes:
+        joining: for each operation under way (index) the unit whose inputs it joins.
+        onsets: unintended contacts.
+        pressing: intended contacts.
+        residual: largest position error of a weld [m].
+        error: the error of a product; None before the first.
+        soundness: whether the engine's model is that of the factory.
+    """
 
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, soundness: Soundness

@@ -23,8 +23,16 @@ from factory.theory.control.navigation import Bundle
 
 
 class Guides:
-    """The guides of axes with degrees of freedom `dof` (axes,). `empty` (axes,): friction without a
-    load [N], as in the model."""
+    """The friction of axes in their guides.
+
+    Args:
+        arrays: the arrays of the model.
+        dof: the degree of freedom of each axis (axes,).
+        across: the second slides of robots whose guidepaths have bends.
+
+    Attributes:
+        empty: friction without a load (axes,) [N], at first as in the model.
+    """
 
     def __init__(self, arrays: ModelArrays, dof: Index, across: Across) -> None:
         self._dof, self._across = dof, across
@@ -52,11 +60,27 @@ class Guides:
 
 
 class Motion:
-    """The axes of a model and their motion from `start` (axes without the tray,) [m] on.
+    """The axes of a model and their motion.
 
-    `robots`: follows the active modes, on the axes `active`. `plan` (4, axes): since when [s], from
-    where [m], how fast [m/s] and under which acceleration [m/s²] axes run that `move` has set
-    going. `stepping` is set before the first step.
+    Args:
+        arrays: the arrays of the model.
+        d: the engine's data.
+        model: the MJCF model.
+        start: positions at the start, without the tray (axes,) [m].
+        gains: factors on the gains of the drives (axes,).
+
+    Attributes:
+        axes: the addresses of the axes in the engine's model.
+        active: the axes of the active modes (n,).
+        robots: the references of robots, which follow the active modes.
+        outfeed: the tray and the shutter of the outfeed.
+        sliders: the sliders of feeders.
+        drives: the setpoints of the drives.
+        guides: the friction of the axes.
+        sleep: which bodies the engine skips.
+        plan: of axes that `move` has set going: since when [s], from where [m], how fast [m/s]
+            and under which acceleration [m/s²] (4, axes).
+        stepping: steps the engine; set before the first step.
     """
 
     stepping: Stepping
@@ -72,7 +96,7 @@ class Motion:
         bias[across.actuator, 1:3] = bias.now[across.actuator, 1:3] * factors[across.axes]
         body, dof = self.axes.body, self.axes.dof
         inertia = m.body_subtreemass[body] + m.dof_armature[dof]
-        turns = self.axes.turns
+        turns = self.axes.is_rotary
         inertia[turns] = m.dof_M0[dof[turns]]
         self.drives = Drives(arrays, d, self.axes.actuator, inertia.round(9), across)
         self.guides = Guides(arrays, dof, across)
@@ -100,7 +124,7 @@ class Motion:
             return
         lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
         self.drives.load(carriages, mass * self.axes.inertia[carriages], np.zeros(len(mass)))
-        self.guides.load(carriages, np.where(self.axes.turns[carriages], 0.0, mass))
+        self.guides.load(carriages, np.where(self.axes.is_rotary[carriages], 0.0, mass))
         lifts = [n for n, robot in enumerate(robots) if robot in lift]
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])

@@ -25,9 +25,13 @@ CLOSE = NEAR + AHEAD
 
 
 class Outfeed:
-    """The tray and the shutter of its shed. `goal` [m]: where the tray goes, 0 is home. `busy`: it
-    has not been at rest at home, with the shed open, since it left. `loading`: it has just been
-    given a product, and leaves a tick later."""
+    """The tray and the shutter of its shed.
+
+    Attributes:
+        goal: where the tray goes; 0 is home [m].
+        busy: whether it has not been at rest at home, with the shed open, since it left.
+        loading: whether it has just been given a product, and leaves a tick later.
+    """
 
     def __init__(
         self, d: mujoco.MjData, model: Model, axes: Axes, follower: Follower, drives: Drives

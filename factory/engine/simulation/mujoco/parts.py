@@ -33,9 +33,13 @@ NOTHING: Mapping[int, float] = MappingProxyType({})
 
 
 class Joining:
-    """The fusions of a model that has bodies for sub-assemblies. `waiting`: the label that each
-    robot (index) has joined, and when [s]; `misfit`: by unit, the misfit of its parts when they
-    were fused."""
+    """The fusions of a model that has bodies for sub-assemblies.
+
+    Attributes:
+        waiting: by robot (index), the label that it has joined and the time when [s], until its
+            parts are fused.
+        misfit: by unit, the misfit of its parts when they were fused.
+    """
 
     def __init__(self, model: Model, holdings: Holdings, welds: Welds) -> None:
         self._model, self._holdings, self._welds = model, holdings, welds
@@ -99,11 +103,19 @@ class Joining:
 
 
 class Parts:
-    """The parts, what holds them, and what becomes of them, switched together.
+    """The parts of a factory and who holds them, switched together with welds and contact masks.
 
-    A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. `tray`: the code of the tray; `strength`: how much of that of robots' hands
-    is used.
+    The weld of a holder and a label is used for every copy of that label: it is aimed at the copy
+    that is held, and its nominal frame is the same for all.
+
+    Attributes:
+        tray: the code of the tray as a holder.
+        holdings: which holder has which part.
+        welds: the welds, switched at once by `Welds.write`.
+        masks: the contact masks of parts.
+        feeders: the feeders.
+        strength: the share of the strength of robots' hands that their loads use.
+        joining: the fusions of parts that have been joined.
     """
 
     def __init__(
@@ -145,7 +157,7 @@ class Parts:
             return False
         loose = self.strength.look()
         if loose:
-            self.welds.loose(loose)
+            self.welds.open(loose)
             self.welds.write()
         return bool(loose)
 

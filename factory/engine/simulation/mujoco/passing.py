@@ -84,7 +84,7 @@ class Passing:
         """Note that a robot (index) has taken a part from its feeder."""
         self.holds[self._fed[robot]] = True
 
-    def come_clear(self, robot: int) -> None:
+    def require_clear(self, robot: int) -> None:
         """A robot (index) holds nothing: the next part comes down once it is out of the way, or at
         home if its hand must be there first."""
         for number in self._fed.get(robot, ()):

@@ -70,12 +70,14 @@ class Strokes:
 
 
 class Sliders:
-    """The sliders of the feeders (n,), in the order of their outlets: one from which the parts of
-    several hang is there for each, and has at most one of them at a time.
+    """The sliders of the feeders (n,), in the order of their outlets. One from which the parts of
+    several outlets hang is there for each of them, and has at most one part at a time.
 
-    `ends` (n,): when each that is under way comes to the end of its way [s], NEVER for others.
-    `up`: when the first of those on their way up does [s].
-    `trees` (n,): their kinematic trees.
+    Attributes:
+        ends: when each that is under way comes to the end of its way (n,) [s]; NEVER for
+            others.
+        up: when the first of those on their way up does [s].
+        trees: their kinematic trees (n,).
     """
 
     def __init__(self, arrays: ModelArrays, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:

@@ -16,7 +16,11 @@ from factory.support.settings import Settings
 
 class Stepping(Protocol):
     """Steps the engine and plans courses. Every implementation gives the same run, to the last bit.
-    `at_once`: largest number of ticks in one call; `seconds`: time spent in the engine's steps."""
+
+    Attributes:
+        at_once: largest number of ticks in one call.
+        seconds: wall time spent in the engine's steps [s].
+    """
 
     at_once: int
     seconds: float

@@ -39,8 +39,13 @@ STRONGER = "let its robot accelerate less (--acceleration), or make the parts li
 
 @dataclass(frozen=True, slots=True)
 class StrengthUse:
-    """The `share` of the strength of a hand that its load used, the name of its `robot` and the
-    `label` of what it held."""
+    """The largest use of a hand's strength.
+
+    Attributes:
+        share: the share of the strength that the load used.
+        robot: the robot, by name.
+        label: what it held.
+    """
 
     share: float
     robot: str

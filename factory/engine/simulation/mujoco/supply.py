@@ -12,9 +12,15 @@ from factory.theory.plant.demand import Word
 
 class Supply:
     """Which units need a part of each label: as many as are requested beside those that have been
-    released to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
-    unit that needs one comes a `period` of units after the one before; `word`: which units are
-    made. `recovers`: the run goes on where something fails."""
+    released to the outfeed, or were begun where the run starts, at most `wip` at once.
+
+    Attributes:
+        period: number of units in a period; the next unit that needs a label comes a period
+            later.
+        next: by label, the next unit that needs a part.
+        word: which units are made.
+        recovers: whether the run goes on after failures.
+    """
 
     def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
         factory, leaves = model.factory, model.factory.leaves
@@ -48,10 +54,16 @@ class Supply:
 
 @dataclass(slots=True)
 class TakenBack:
-    """Withdrawn parts. `numbers`: feeders that withdraw a part; `fresh`: units of parts that have
-    begun to be presented, by label; `good`: labels whose presented part passed the camera;
-    `awaited`: labels of which none may come yet; `late`: feeders that had nothing to present on
-    their turn, so that their robots may be home before the next part."""
+    """Parts that feeders withdraw, and what is known of those that they present.
+
+    Attributes:
+        numbers: feeders that withdraw a part.
+        fresh: by label, units of parts that have begun to be presented.
+        good: labels whose presented part passed the camera.
+        awaited: labels of which none may come yet.
+        late: feeders that had nothing to present on their turn, so that their robots may be
+            home before the next part.
+    """
 
     numbers: list[int] = field(default_factory=list)
     fresh: dict[str, int] = field(default_factory=dict)

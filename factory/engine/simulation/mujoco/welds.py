@@ -1,5 +1,9 @@
-"""The welds that a run switches, and bodies that it places: all changes between two steps of the
-engine, gathered and written at once."""
+"""Switches the welds of a run, and places bodies.
+
+All changes between two steps of the engine are gathered, and `Welds.write` writes them at once. No
+other function of a run switches a weld (`eq_active`) or aims one (`eq_obj2id`). Which welds are
+closed, and on which bodies, follows from who holds what (`holdings.py`).
+"""
 
 from __future__ import annotations
 
@@ -21,10 +25,19 @@ Place = tuple[float, float, float]
 
 
 class Takeovers:
-    """Measurements of bodies as a grip closes on them. `count`: bodies taken over; `gap` [m] and
-    `turn` [rad]: largest distance and angle between the frames that a grip joined; `off` [m]:
-    largest displacement of a vertex by its grip, turns included. `radii` (nbody,): distance of
-    vertices from their body's origin [m]. The kinematics in `d` are up to date."""
+    """Measurements of hand-overs: how far off a body was when the weld of its new holder closed.
+
+    Args:
+        m: the engine's model.
+        d: its data, whose kinematics are up to date.
+        radii: largest distance of a vertex from its body's origin [m] (nbody,).
+
+    Attributes:
+        count: number of bodies handed over.
+        gap: largest distance between the two frames that a weld joined [m].
+        turn: largest angle between them [rad].
+        off: largest displacement of a vertex by its weld, turns included [m].
+    """
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, radii: Array) -> None:
         self.count, self.gap, self.turn, self.off = 0, 0.0, 0.0, 0.0
@@ -47,10 +60,13 @@ class Takeovers:
 
 
 class PadGaps:
-    """Distances between holders' pads and their payloads. `largest` [m]: largest distance between
-    the pads of a holder and the nearest of its bodies; None while no holder with pads has taken
-    anything. Pads are measured at a holder's first payload: welds are rigid, so further bodies
-    bring the nearest no farther away."""
+    """Distances between holders' pads and their payloads. Pads are measured at a holder's first
+    payload: welds are rigid, so further bodies bring the nearest no farther away.
+
+    Attributes:
+        largest: largest distance between the pads of a holder and the nearest of its bodies [m];
+            None while no holder with pads has taken anything.
+    """
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         self.largest: float | None = None
@@ -93,8 +109,15 @@ class PadGaps:
 
 @dataclass(slots=True)
 class Gathered:
-    """What is to be switched `on` and `off` (welds, the former with the bodies that they hold), of
-    these what takes bodies over (`gripped`), who has what (`held`), and what is put where."""
+    """Changes that are not written yet. Welds and bodies are given by number in the engine's model.
+
+    Attributes:
+        on: welds to be closed, each with the body that it is to hold.
+        off: welds to be opened.
+        gripped: of `on`, those that hand a body over, so that they are measured.
+        held: bodies whose holder changes, each with the code of the new one.
+        placed: bodies to be placed, each with its position [m].
+    """
 
     on: dict[int, int] = field(default_factory=dict)
     off: set[int] = field(default_factory=set)
@@ -104,11 +127,17 @@ class Gathered:
 
 
 class Welds:
-    """Gathers what is to be switched until `write`; the last that is said of a weld or body counts.
+    """The welds of a model, switched by `write`. Of several changes of a weld or body the last
+    counts. Holders are given by their codes (`mjcf/masks.py`).
 
-    `radii` (nbody,): how far vertices are from their body's origin [m]; `taken`: what was measured
-    of bodies that were taken over; `pads`: how far holders' pads were from them; `closed`: when a
-    weld was switched on last [s].
+    Args:
+        radii: largest distance of a vertex from its body's origin [m] (nbody,).
+
+    Attributes:
+        masks: the contact masks of parts, which follow from their holders.
+        taken: measurements of hand-overs.
+        pads: distances between holders' pads and their payloads.
+        closed: when a weld was closed last [s].
     """
 
     def __init__(
@@ -122,42 +151,42 @@ class Welds:
         self.pads = PadGaps(m, d)
         self.closed = -np.inf
         self._next = Gathered()
-        self._bent: dict[int, Array] = {}
+        self._nominal: dict[int, Array] = {}
 
-    def loose(self, welds: Iterable[int]) -> None:
-        """Switch welds off."""
+    def open(self, welds: Iterable[int]) -> None:
+        """Open welds."""
         for weld in welds:
             self._next.on.pop(weld, None)
             self._next.gripped.pop(weld, None)
             self._next.off.add(weld)
 
-    def join(self, welds: Mapping[int, int]) -> None:
-        """Switch welds on, each aimed at a body."""
+    def close(self, welds: Mapping[int, int]) -> None:
+        """Close welds, each on a body."""
         self._next.on.update(welds)
 
-    def grip(self, welds: Mapping[int, int]) -> None:
-        """Close welds that take bodies over: their gaps are measured."""
-        self.join(welds)
+    def close_and_measure(self, welds: Mapping[int, int]) -> None:
+        """Close the welds of bodies that are handed over, and measure how far off these are."""
+        self.close(welds)
         self._next.gripped.update(welds)
 
-    def hold(self, bodies: Iterable[int], holder: int) -> None:
-        """Put parts into the hands of a holder (code)."""
+    def set_holder(self, bodies: Iterable[int], holder: int) -> None:
+        """Set the holder of parts, from which their contact masks follow. Switches no weld."""
         self._next.held.update(dict.fromkeys(bodies, holder))
 
     def place(self, body: int, at: Place) -> None:
         """Place a free body [m], at rest, in the orientation in which it is presented."""
         self._next.placed[body] = at
 
-    def bend(self, weld: int, place: Array) -> None:
-        """A weld holds its body at another place in its holder (7,), until it is switched on anew,
-        or straightened."""
-        self._bent.setdefault(weld, self._frames.now[weld, 3:10].copy())
-        self._frames[weld, 3:10] = place
+    def offset(self, weld: int, pose: Array) -> None:
+        """Let a weld hold its body at another pose in its holder (7,), until it is closed again or
+        its offset ended."""
+        self._nominal.setdefault(weld, self._frames.now[weld, 3:10].copy())
+        self._frames[weld, 3:10] = pose
 
-    def straighten(self, welds: Iterable[int]) -> None:
-        """Welds hold their bodies where they should."""
-        for weld in self._bent.keys() & welds:
-            self._frames[weld, 3:10] = self._bent.pop(weld)
+    def end_offset(self, welds: Iterable[int]) -> None:
+        """Let welds hold their bodies at their nominal poses again."""
+        for weld in self._nominal.keys() & welds:
+            self._frames[weld, 3:10] = self._nominal.pop(weld)
 
     def turn(self, body: int, quaternion: Array, aside: Array) -> None:
         """Turn a free body, displaced by `aside` (3,) [m]."""
@@ -171,7 +200,7 @@ class Welds:
         """Write all gathered changes into the engine, and wake the bodies concerned."""
         if self._next == Gathered():
             return
-        self.straighten(self._next.on)
+        self.end_offset(self._next.on)
         self._put()
         self.pads.measure(self._next.on)
         if self._next.gripped:

@@ -43,12 +43,25 @@ GIVEN_UP = tuple(
 
 
 class MujocoWorld:
-    """A compiled model `m` with its data `d`, the motion of the axes, and the parts.
+    """The MuJoCo world of a run.
 
-    `start` [m] and `gains` (axes,): where each axis is, and a factor on its controller gain;
-    `counts`: how often each transition has fired where the run starts; `loaded`: what `load` has
-    given for the model, of which a copy is run. Raises InputError (BadMesh) where the
-    engine refuses the model, with the engine's own words.
+    Args:
+        model: the MJCF model.
+        request: the request for the run.
+        start: the position of each axis (axes,) [m].
+        gains: a factor on the controller gain of each axis (axes,).
+        counts: how often each transition has fired where the run starts.
+        loaded: what `load` has given for the model, of which a copy is run; None to load it.
+
+    Attributes:
+        m: the engine's model.
+        d: its data.
+        motion: the motion of the axes.
+        parts: the parts and their holders.
+        inspection: the measurements of the run.
+        dropoffs: time at which each product left [s].
+
+    Raises InputError (BadMesh) where the engine refuses the model, with the engine's own words.
     """
 
     instant = False

@@ -32,9 +32,14 @@ from factory.theory.problem.ids import RobotId
 
 @dataclass(frozen=True, slots=True)
 class Tours:
-    """A `factory` with a robot for each tour of another; `of`: for each robot of that the robots
-    of its tours; `turning`: those of robots that go back to where they have been before, since one
-    that delivers there comes again."""
+    """A factory in which each tour has a robot of its own.
+
+    Attributes:
+        factory: that factory.
+        of: for each robot of the original one the robots of its tours.
+        turning: the tours of robots that go back to where they have been before, since one that
+            delivers there comes again.
+    """
 
     factory: Factory
     of: tuple[tuple[int, ...], ...]
@@ -78,10 +83,20 @@ class Tours:
 
 
 class Hands:
-    """The hands of a factory's robots. A carrier's hand depends on its heading only, since those
-    that deliver to it depend on its line; any other's on its frame. `travels`: least travels of
-    robots [m], as layouts have shown. `wanted`: hands that robots (index) with one tour keep if
-    these fit."""
+    """Chooses the hands of a factory's robots, each when it is asked for. A carrier's hand depends
+    on its heading only, since those that deliver to it depend on its line; any other's depends on
+    its frame.
+
+    Args:
+        factory: the factory.
+        product: its solids.
+        push: largest acceleration that hands must bear [m/s²].
+        wanted: hands that robots (index) with one tour keep if these fit.
+
+    Attributes:
+        tours: the factory with a robot for each tour, for which hands are chosen.
+        travels: least travels of robots (index), as layouts have shown [m].
+    """
 
     def __init__(
         self,

@@ -20,10 +20,18 @@ from factory.theory.plant.operation import Operation
 
 
 class Holding:
-    """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
-    delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
-    [m/s²]; `turning`: robots that go on either way after what is delivered to them.
-    `wanted`: by label points at which it is to be held where it can be [m]."""
+    """The robots of a factory and the surfaces of what they hold.
+
+    Attributes:
+        factory: the factory.
+        product: its solids.
+        push: acceleration that holding must bear [m/s²].
+        turning: robots (index) that go on either way after what is delivered to them.
+        surfaces: the surfaces of sub-assemblies.
+        wanted: by label, points at which it is to be held if it can be [m].
+        on: the carrier that each robot delivers to, -1 for none (robots,).
+        axis: the axis along which each robot lies, 0 for x (robots,).
+    """
 
     def __init__(
         self,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -345,5 +346,5 @@ class InTheWay:
 
 def _any(sweeps: Iterable[Swept], places: Places) -> Truth:
     """Whether any sweep meets its boxes, for each place (n,)."""
-    met = [np.zeros(len(places), bool), *(hit(*ways) for ways in sweeps)]
-    return np.asarray(np.logical_or.reduce(met))
+    met = (hit(*ways) for ways in sweeps)
+    return reduce(np.logical_or, met, np.zeros(len(places), bool))

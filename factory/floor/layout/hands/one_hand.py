@@ -58,7 +58,12 @@ Fit = tuple[Way, Way, Kind, float]
 @dataclass(frozen=True, slots=True)
 class OneHand:
     """Finds one hand for some tours, each given by its robot in a factory with a robot for each
-    tour. `adjusted`: tours of robots whose lift is adjusted for each."""
+    tour.
+
+    Attributes:
+        in_the_way: the obstacles of hands.
+        adjusted: tours of robots whose lift is adjusted for each.
+    """
 
     in_the_way: InTheWay
     adjusted: frozenset[int] = frozenset()

@@ -25,6 +25,9 @@ Way = tuple[float, float]
 TOUCH = 1e-5
 """Boxes that overlap by no more only touch [m]."""
 
+FEW = 4
+"""Of more boxes than this those that are near are looked for first."""
+
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
 
@@ -193,7 +196,9 @@ def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
 def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
     """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
     `spare` [m]."""
-    return np.asarray(_overlap(low, high, boxes[near(low, high, boxes)], spare).any(axis=1))
+    if len(boxes) > FEW:
+        boxes = boxes[near(low, high, boxes)]
+    return np.asarray(_overlap(low, high, boxes, spare).any(axis=1))
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:

@@ -95,7 +95,7 @@ class Neighbours:
         if self.culls:
             mujoco.mj_kinematics(m, d)
             self._ways = Extents(m, d, axes, len(parts.model.factory.robots))
-            turns = axes.turns
+            turns = axes.is_rotary
             self._box = _boxes(m, d, parts, count)
             _turned(*self._box, self._holder[turns], d.xanchor[m.dof_jntid[axes.dof[turns]], :2])
             self._began = self._ways.low

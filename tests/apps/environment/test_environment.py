@@ -1,0 +1,129 @@
+"""A factory as a Gymnasium environment: its checker, the baseline, and agents by chance."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+import factory
+from tests.paths import ROOT
+
+gymnasium = pytest.importorskip("gymnasium", reason="the extra `gym` is not installed")
+
+from factory.apps.environment.plant import FactoryEnv  # noqa: E402
+from factory.apps.environment.programs import Programs  # noqa: E402
+
+
+def env_of(name: str, **how: Any) -> FactoryEnv:
+    made = factory.env(ROOT / "examples" / f"{name}.pag", **how)
+    assert isinstance(made, FactoryEnv)
+    return made
+
+
+def episode(env: FactoryEnv, seed: int) -> tuple[float, list[str], dict[str, Any]]:
+    """The reward of an episode by the baseline, what was refused, and the last info."""
+    seen, info = env.reset(seed=seed)
+    agent, paid, refused, over = Programs(env), 0.0, list[str](), False
+    while not over:
+        action = agent.act(seen, info["time"])
+        assert env.action_space.contains(action)
+        seen, reward, ended, cut_off, info = env.step(action)
+        assert env.observation_space.contains(seen)
+        paid, over = paid + reward, ended or cut_off
+        refused += info["refused"]
+    return paid, refused, info
+
+
+def test_it_passes_the_checker_of_gymnasium() -> None:
+    from gymnasium.utils.env_checker import check_env
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", ".*not having a spec.*")
+        check_env(env_of("paper", units=2, jitter=0.2, render_mode="rgb_array"))
+
+
+@pytest.mark.parametrize("name", ["paper", "peg", "stool", "chest", "family"])
+def test_the_baseline_makes_all_units(name: str) -> None:
+    paid, refused, info = episode(env_of(name, units=3, jitter=0.3, interval=0.05), 5)
+    assert (paid, refused, info["products"], info["tripped"]) == (3.0, [], 3, False)
+
+
+def test_the_same_seed_is_the_same_episode() -> None:
+    env, ways = env_of("paper", jitter=0.3), list[list[float]]()
+    for seed in (1, 2, 1):
+        seen, info = env.reset(seed=seed)
+        agent = Programs(env)
+        for _ in range(20):
+            seen, *_, info = env.step(agent.act(seen, info["time"]))
+        ways.append(seen["position"].tolist())
+    assert ways[0] == ways[2] != ways[1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_legal_jobs_are_not_refused_and_others_are(seed: int) -> None:
+    """One robot at a time takes up or gives up a job, drawn by chance; grips follow the baseline,
+    so what is refused is the job."""
+    env, rng = env_of("paper", units=2, interval=0.05), np.random.default_rng(seed)
+    seen, info = env.reset(seed=seed)
+    agent, tried = Programs(env), {True: 0, False: 0}
+    for _ in range(60):
+        action = agent.act(seen, info["time"])
+        changed = np.flatnonzero(action["job"] != seen["job"])
+        action["job"] = seen["job"].copy()
+        robot = int(rng.choice(changed)) if len(changed) else int(rng.integers(6))
+        job = int(rng.integers(env.action_space["job"].nvec[robot]))
+        legal = bool(seen["legal"][robot, job])
+        if seen["job"][robot] and job:  # it gives its job up first
+            job, legal = 0, bool(seen["legal"][robot, 0])
+        tried[legal] += job != seen["job"][robot]
+        action["job"][robot] = job
+        action["grip"] = np.array(env.simulation.supervisor.interlock.commands.grip, np.int8)
+        seen, *_, info = env.step(action)
+        assert bool(info["refused"]) == (not legal), (robot, job, info["refused"])
+    assert tried[False], "nothing illegal was tried"
+
+
+@pytest.mark.parametrize("name", ["paper", "stool"])
+def test_what_touches_stops_the_plant(name: str) -> None:
+    """By chance, 20 times a second: no two machines meet, and a hand that touches a part while it
+    is moved about under it trips the plant."""
+    env = env_of(name, units=3, interval=0.05)
+    for seed in range(4):
+        env.reset(seed=seed)
+        env.action_space.seed(seed)
+        for _ in range(100):
+            *_, cut_off, info = env.step(env.action_space.sample())
+        touch = env.simulation.world.collision
+        assert info["tripped"] == cut_off == bool(touch)
+        assert not touch or "/pad and part/" in touch
+
+
+def test_worlds_are_a_vector() -> None:
+    worlds = factory.env(ROOT / "examples" / "paper.pag", units=1, worlds=3)
+    assert isinstance(worlds, gymnasium.vector.VectorEnv)
+    seen, _ = worlds.reset(seed=7)
+    assert seen["legal"].shape == (3, 6, 8)
+    first, *others = (env.unwrapped for env in worlds.envs)
+    assert all(env.simulation.model is first.simulation.model for env in others)
+    agents = [Programs(env.unwrapped) for env in worlds.envs]
+    paid = np.zeros(3)
+    for n in range(60):
+        each = [
+            agent.act({key: value[k] for key, value in seen.items()}, 0.1 * n)
+            for k, agent in enumerate(agents)
+        ]
+        action = {key: np.stack([one[key] for one in each]) for key in each[0]}
+        seen, reward, ended, *_ = worlds.step(action)
+        paid += reward
+        if ended.all():
+            break
+    assert paid.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_a_wrong_render_mode_is_named() -> None:
+    with pytest.raises(factory.InputError, match="rgb_array"):
+        env_of("paper", render_mode="human")
