@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.engine.mjcf.replica import Replica
+from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.film.ink import Pixels
 from factory.film.marks import THIN, Mark
 from factory.film.picture import RendererName, Size
@@ -50,6 +50,9 @@ metals of a machine of 0.4 m, and so it reaches 3 cm."""
 
 SOFT = 0.045
 """Radius of the sun as a still sees it [rad]."""
+
+NOTHING = 1e-4
+"""What is left out is so many times as large: which groups are seen is asked only once."""
 
 MULTISAMPLES = 4
 
@@ -263,9 +266,8 @@ class Filament(Closing):
         np.multiply(d.geom_xpos, SCALE, out=self.d.geom_xpos)
         self.d.geom_xmat[:] = d.geom_xmat
         self.m.geom_rgba[:] = m.geom_rgba
-        if not np.array_equal(self.m.geom_group, m.geom_group):
-            self.m.geom_group[:] = m.geom_group
-            self.things.set_options(mujoco.MjvOption())
+        out = (m.geom_group >= SHOWN) & (self.m.geom_group < SHOWN)
+        self.d.geom_xmat[out] *= NOTHING
         self.things.update(self.d)
 
     def _aim(self, view: View, shift: tuple[float, float] = (0.0, 0.0)) -> None:

@@ -234,15 +234,17 @@ class NetPanel:
             y = self.sheet.height(row)
             ink.box(start, y - self.rings.half, end, y + self.rings.half, colour, row.alpha)
             if named and row.robot == operation.carrier:
-                name = self._name(operation, self._room(operation))
+                name = self._name(operation)
                 y -= self.rings.half + 10 * self.sheet.scale if self.rings.airy else 0
                 ink.words((start + end) / 2, y, name, self.sheet.small, INK, "m", row.alpha)
 
-    def _name(self, operation: Operation, room: float) -> str:
+    def _name(self, operation: Operation) -> str:
         """What an operation does to what, as far as there is room."""
-        short = operation.template.name
-        long = short if short == operation.label else f"{short} {operation.label}"
-        whole = (name for name in (long, operation.label) if width(name, self.sheet.small) <= room)
+        start, end = self.rings.span(operation.index)
+        room = end - max(start, self.sheet.gutter) + (6 if self.rings.airy else -6)
+        short, label = operation.template.name, operation.label
+        long = short if short == label else f"{short} {label}"
+        whole = (name for name in (long, label) if width(name, self.sheet.small) <= room)
         return next(whole, "")
 
     def _bar(
@@ -299,8 +301,7 @@ class NetPanel:
         if not spell.operation:
             return
         operation = self.factory.operations[self._operation(row.robot, spell)]
-        is_named = self.rings.airy and row.robot == operation.carrier
-        if is_named and self._name(operation, self._room(operation)):
+        if self.rings.airy and row.robot == operation.carrier and self._name(operation):
             return
         left, right = self.rings.ends(row.robot)
         free, gap = (left - sheet.gutter, sheet.size[0] - sheet.edge - right), 6 * sheet.scale
@@ -313,11 +314,6 @@ class NetPanel:
         half = 0.6 * sheet.small
         ink.box(x - 1, y - half, x + wide + 1, y + half, GROUND, 0.85 * row.alpha)
         ink.words(x, y, label, sheet.small, dark, "l", row.alpha)
-
-    def _room(self, operation: Operation) -> float:
-        """Room for the name of an operation."""
-        start, end = self.rings.span(operation.index)
-        return end - max(start, self.sheet.gutter) + (6 if self.rings.airy else -6)
 
     def _flashes(self, ink: Ink, time: float) -> None:
         shown = {operation.index for operation in self._operations()}

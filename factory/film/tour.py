@@ -2,7 +2,7 @@
 and at the end the last product as it is delivered.
 
 It cuts at events: to a hand-over when its operation starts, back a moment after it has ended, and
-to the delivery when the last unit is whole. So a film of a run and one of its record are the same.
+to the delivery when the last unit is whole. It knows what has fired and nothing of what comes.
 """
 
 from __future__ import annotations

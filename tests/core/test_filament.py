@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from factory.engine.mjcf.replica import Replica
+from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.film import filament, studio
 from factory.film.picture import Picture
 from factory.floor.geometry.sight import View
@@ -70,14 +70,31 @@ def test_the_environment_is_a_cube_map_of_the_studio() -> None:
     assert up.min() > down.min() > side.min() > 0.4
 
 
+BALL = "<mujoco><worldbody><geom size='1' rgba='1 0 0 1'/></worldbody></mujoco>"
+AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
+VIEW = View(np.array([0.0, -6.0, 0.0]), AXES, 0.3, 0.3, 6.0, 1.0)
+
+
 def test_filament_draws_and_keeps_the_output_clean(capfd: pytest.CaptureFixture[str]) -> None:
     if filament.fault() is not None:
         pytest.skip("Vulkan does not work here")
-    ball = "<mujoco><worldbody><geom size='1' rgba='1 0 0 1'/></worldbody></mujoco>"
-    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    view = View(np.array([0.0, -6.0, 0.0]), axes, 0.3, 0.3, 6.0, 1.0)
-    model = mujoco.MjModel.from_xml_string(ball)
+    model = mujoco.MjModel.from_xml_string(BALL)
     with filament.Filament(Replica(model), (64, 48)) as renderer:
-        red, green, _ = renderer.mean(view, 4)[24, 32]
+        red, green, _ = renderer.mean(VIEW, 4)[24, 32]
     assert red > 2 * green
     assert capfd.readouterr() == ("", "")
+
+
+def test_filament_leaves_out_what_is_left_out_of_a_replica() -> None:
+    """And shows it again: the renderer asks for the groups of geoms only once."""
+    if filament.fault() is not None:
+        pytest.skip("Vulkan does not work here")
+    replica = Replica(mujoco.MjModel.from_xml_string(BALL))
+    seen = list[bool]()
+    with filament.Filament(replica, (64, 48)) as renderer:
+        for group in (0, SHOWN, 0):
+            replica.m.geom_group[0] = group
+            replica.place(replica.d.qpos)
+            red, green, _ = renderer.mean(VIEW, 2)[24, 32].astype(int)
+            seen.append(bool(red > 2 * green))
+    assert seen == [True, False, True]

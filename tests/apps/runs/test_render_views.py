@@ -11,7 +11,7 @@ from factory.apps.log import Log, LogWriter, read_log
 from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.engine.mjcf import names
-from factory.engine.mjcf.replica import Replica
+from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -275,8 +275,17 @@ def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
             assert (alpha < DIMMER + 0.01) == holders.isdisjoint(near.robots)
         else:
             assert (m.geom_rgba[g] == before[g]).all()
+    groups = take.m.geom_group
+    assert (m.geom_group == groups).all()  # there is no mesh among these parts
+    parts = [g for own in spotlight.loads.values() for g in own if groups[g] < SHOWN]
+    m.geom_type[parts] = mujoco.mjtGeom.mjGEOM_MESH
+    spotlight.aim(near.robots, shown)
+    out = np.flatnonzero(m.geom_group != groups).tolist()
+    assert {*out} <= {*parts} and (m.geom_group[out] == SHOWN).all()
+    others = {body for robot, body in grips if robot not in near.robots}
+    assert {int(m.body_rootid[m.geom_bodyid[g]]) for g in out} <= others
     spotlight.aim(None, shown)
-    assert (m.geom_rgba == before).all()
+    assert (m.geom_rgba == before).all() and (m.geom_group == groups).all()
 
 
 # --- a tour ---------------------------------------------------------------------------------------
