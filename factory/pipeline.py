@@ -166,11 +166,23 @@ class Project:
             from factory.floor.mating.findings import together
 
             return together(filter(None, (one.matings for one in self.each)))
+        return self._judged(as_drawn=False)
+
+    def _judged(self, as_drawn: bool) -> Matings:
         from factory.floor.mating.mating import matings
 
         nodes = expand(self.pag, self.templates, self._single)
         lowered = {**placed(nodes, self.catalogue), **self.lowered}
-        return matings(nodes, self.product, True, lowered)
+        return matings(nodes, self.product, True, lowered, as_drawn)
+
+    def with_product(self, product: Product, as_drawn: bool = False) -> Project:
+        """The same product with solids that have been computed. `as_drawn`: its ways are those of
+        parts as they are drawn, without what the bodies overlap that collide in runs."""
+        made = self._changed(set())
+        made.__dict__["product"] = product
+        if as_drawn:
+            made.__dict__["matings"] = made._judged(as_drawn)
+        return made
 
     @property
     def overlaps(self) -> DrawnOverlaps:

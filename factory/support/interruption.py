@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future
+from concurrent.futures import Future, as_completed
 from contextlib import contextmanager
 from threading import Thread
 from types import FrameType
@@ -87,10 +87,13 @@ def awaited(work: Callable[[], T]) -> T:
     return side_by_side([work])[0]
 
 
-def side_by_side(works: Sequence[Callable[[], T]]) -> list[T]:
+def side_by_side(
+    works: Sequence[Callable[[], T]], report: Callable[[int, int], None] = lambda *_: None
+) -> list[T]:
     """What each of `works` gives, in their order, done in as many threads as there are processors,
-    while the caller hears signals. Raises as the first that fails does. Work that is interrupted is
-    left alone, and ends with the program."""
+    while the caller hears signals, and calls `report` with how many are done, and of how many.
+    Raises as the first that fails does. Work that is interrupted is left alone, and ends with the
+    program."""
     tasks = [(work, Future[T]()) for work in works]
     left = iter(tasks)
 
@@ -103,6 +106,8 @@ def side_by_side(works: Sequence[Callable[[], T]]) -> list[T]:
 
     for _ in range(min(len(tasks), os.cpu_count() or 1)):
         Thread(target=do, daemon=True).start()
+    for number, _ in enumerate(as_completed([done for _, done in tasks]), 1):
+        report(number, len(tasks))
     return [done.result() for _, done in tasks]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from factory.api import Array, Indices, Product
+from factory.api import Array, Indices
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
@@ -171,15 +171,13 @@ def rooms(source: InPlace, axis: int) -> Array:
 
 def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Indices]:
     """The convex bodies of all parts, unit by unit, and the unit of each part."""
-    units = source.units()
-    solids = {part.label: part.solid for _, members in units for part in members}
+    units, labels = source.units(), tuple(source.product.solids)
     unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
-    low = np.min([solid.low for solid in solids.values()], axis=0)
-    high = np.max([solid.high for solid in solids.values()], axis=0)
-    convex = bodies(Product(solids, low, high), list(solids))
-    every = Meeting("", (), 0, 0, 0, len(solids), either=True)
-    borders, levels = np.zeros(len(solids) - 1, np.int64), np.zeros(1, np.int64)
-    return Finder(convex, Meetings(tuple(solids), (every,), borders, levels)), convex, unit
+    convex = bodies(source.product, labels)
+    every = Meeting("", (), 0, 0, 0, len(labels), either=True)
+    borders, levels = np.zeros(len(labels) - 1, np.int64), np.zeros(1, np.int64)
+    meetings = Meetings(labels, (every,), borders, levels)
+    return Finder(convex, meetings, as_drawn=True), convex, unit
 
 
 def _hidden(overlaps: Overlaps, unit: Indices, labels: Sequence[str]) -> tuple[Overlapping, ...]:

@@ -96,11 +96,17 @@ class LaidOut:
 
 
 class Layouts:
-    """The layouts of a source's trees. The geometry is computed once per stance."""
+    """The layouts of a source's trees. The geometry is computed once per stance: meshes are
+    decomposed into convex bodies, and `report` is called with how many are."""
 
     def __init__(
-        self, source: InPlace, templates: Mapping[str, Template], settings: Settings
+        self,
+        source: InPlace,
+        templates: Mapping[str, Template],
+        settings: Settings,
+        report: Callable[[int, int], None] = lambda *_: None,
     ) -> None:
+        self.report = report
         self.source, self.templates, self.settings = source, templates, settings
         self.catalogue = load_catalogue()
         self._products: dict[Stance, Product] = {}
@@ -113,10 +119,12 @@ class Layouts:
         made = planned_product(self.source, tree, judged.stance.rotation)
         text = next(iter(made.files.values())).decode()
         pag = read_pag(text, self.templates, folder=None)
-        project = Project(pag, self.templates, self.catalogue, self.settings, Ground())
+        plain = Project(pag, self.templates, self.catalogue, self.settings, Ground())
         if judged.stance not in self._products:
-            self._products[judged.stance] = product_geometry(pag, self.source.files)
-        project.__dict__["product"] = self._products[judged.stance]
+            product = product_geometry(pag, self.source.files, report=self.report)
+            twin = self.source.product, judged.stance.rotation
+            self._products[judged.stance] = replace(product, twin=twin)
+        project = plain.with_product(self._products[judged.stance], as_drawn=True)
         laid = LaidOut(judged, tree, project, self.kinds(judged.tree))
         lines = [one for line in screw_lines(tree, self._kinds) for one in _lines(project, line)]
         why = self._spread(screws_in(tree), lines)
@@ -142,7 +150,6 @@ class Layouts:
         if not laid.lines or (isfinite(laid.seconds) and not laid.held):
             return laid
         project = laid.project.with_plan(Plan())
-        project.__dict__["product"] = laid.project.product
         alone = replace(laid, project=project, lines=())
         fits = isfinite(laid.seconds)
         if (fits and laid.held <= alone.held) or not isfinite(alone.seconds):

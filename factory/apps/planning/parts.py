@@ -6,9 +6,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
-from factory.api import PAG, Array, Assembly, Diagnostic, Indices, InputError, Mesh, Solid, listing
+import numpy as np
+
+from factory.api import (
+    PAG,
+    Array,
+    Assembly,
+    Diagnostic,
+    Indices,
+    InputError,
+    Mesh,
+    Product,
+    Solid,
+    listing,
+)
 from factory.floor.geometry.decomposition import FULL
 from factory.floor.geometry.meshes import is_closed
 from factory.floor.geometry.overlap import drawn
@@ -101,6 +115,14 @@ class InPlace:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "files", MappingProxyType(dict(self.files)))
+
+    @cached_property
+    def product(self) -> Product:
+        """Its parts as a product, unit by unit."""
+        solids = {part.label: part.solid for _, members in self.units() for part in members}
+        low = np.min([solid.low for solid in solids.values()], axis=0)
+        high = np.max([solid.high for solid in solids.values()], axis=0)
+        return Product(solids, low, high)
 
     def units(self) -> tuple[tuple[str, tuple[PlacedPart, ...]], ...]:
         """The units of planning, each with its parts: kept sub-trees and all other parts."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,9 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
 from factory.theory.compiler.expanding import expand
+
+DECOMPOSING = "decomposing parts into convex bodies"
+"""The name of the stage after a tree is found: layouts and runs need these bodies, ways do not."""
 
 LAYING = "laying out"
 """The name of the last stage of planning."""
@@ -135,15 +138,15 @@ class PlanFigures:
 @dataclass(frozen=True)
 class Planned:
     """A `tree` of labels, as `writing.planned_product` takes it, the rotation (3, 3) of the product
-    onto the floor, the operations and figures, and the laid-out `project` (None if estimates alone
-    decided). `optimal`: whether it is proved that no tree is better in price and expected cycle;
-    `hidden`: the pairs that overlap according to accepted hulls; `notes`: the orientation and other
-    remarks; `screws`: the units that are screws, driven in or not; `lines`: those that share a
-    robot, `alone`: why others do not."""
+    onto the floor, what gives its operations, its figures, and the laid-out `project` (None if
+    estimates alone decided). `optimal`: whether it is proved that no tree is better in price and
+    expected cycle; `hidden`: the pairs that overlap according to accepted hulls; `notes`: the
+    orientation and other remarks; `screws`: the units that are screws, driven in or not; `lines`:
+    those that share a robot, `alone`: why others do not."""
 
     tree: Tree = field(repr=False)
     orientation: Array
-    operations: tuple[PlannedJoin, ...] = field(repr=False)
+    joined: Callable[[], tuple[PlannedJoin, ...]] = field(repr=False, compare=False)
     figures: PlanFigures
     optimal: bool
     project: Project | None = field(default=None, repr=False, compare=False)
@@ -152,6 +155,11 @@ class Planned:
     screws: tuple[str, ...] = ()
     lines: tuple[tuple[str, ...], ...] = ()
     alone: tuple[str, ...] = ()
+
+    @cached_property
+    def operations(self) -> tuple[PlannedJoin, ...]:
+        """Its operations, whose clearances are measured when they are asked for."""
+        return self.joined()
 
 
 @dataclass(frozen=True)
@@ -227,7 +235,13 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
 
     screws = _screws(source, graphs, asked)
     sought = sought_for(screws)
-    layouts = Layouts(source, templates, asked.settings)
+    if asked.lay_out:
+        asked.told(DECOMPOSING, 1, None, "")
+
+    def decomposed(done: int, total: int) -> None:
+        asked.told(DECOMPOSING, done, total, "meshes")
+
+    layouts = Layouts(source, templates, asked.settings, decomposed)
     named = tuple(graphs.labels[n] for n in screws)
     if not asked.lay_out:
         made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
@@ -240,7 +254,6 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         asked.told(LAYING, laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget, said)
-    asked.told("measuring clearances", 1, None, "")
     return replace(_result(pose, best, sought.optimal, laid[0]), screws=named)
 
 
@@ -299,13 +312,16 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
         cycle=laid.seconds if layouts and np.isfinite(laid.seconds) else None,
         area=laid.area if layouts and np.isfinite(laid.area) else None,
     )
-    axes = sorted({join.direction[0] for join in judged.joins})
-    room = {axis: rooms(pose.source, axis) for axis in axes}
-    joins = tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)
+
+    def joined() -> tuple[PlannedJoin, ...]:
+        axes = sorted({join.direction[0] for join in judged.joins})
+        room = {axis: rooms(pose.source, axis) for axis in axes}
+        return tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)
+
     project = laid.project if layouts else None
     orientation = judged.stance.rotation @ pose.turn
     shared: dict[str, Any] = {"lines": laid.lines, "alone": laid.apart}
-    return Planned(laid.tree, orientation, joins, figures, optimal, project, **shared)
+    return Planned(laid.tree, orientation, joined, figures, optimal, project, **shared)
 
 
 def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:

@@ -38,6 +38,7 @@ from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
 from factory.floor.geometry.meshes import hull_mesh
+from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.product import product_geometry
 from factory.theory.lang.source import quoted
 from factory.theory.problem.pag import SHAPES
@@ -198,12 +199,14 @@ def placed(
 ) -> tuple[tuple[PlacedPart, ...], tuple[Diagnostic, ...]]:
     """The parts of a PAG, each as a kind of its own, and warnings. Raises InputError (BadMesh,
     BadValue)."""
-    product = product_geometry(pag, files)
+    product = product_geometry(pag, files, decomposed=False)
+    if can_decompose() and any(drawn(solid) is None for solid in product.solids.values()):
+        product = product_geometry(pag, files)  # what is near an open mesh is known by its bodies
     parts = []
     for node in pag.parts():
         solid = product.solids[node.label]
         parts.append(PlacedPart(node.label, *surface(solid), node.label, solid, node))
-    return tuple(parts), (*product.warnings, *_hulls(parts))
+    return tuple(parts), (*product.warnings, *(() if can_decompose() else _hulls(parts)))
 
 
 def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:

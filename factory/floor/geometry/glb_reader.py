@@ -144,6 +144,10 @@ def _numbers(value: object, count: int, what: str) -> Array:
     raise _broken(f"{what} is not {count} numbers")
 
 
+PACKED = {"KHR_draco_mesh_compression": "Draco", "EXT_meshopt_compression": "meshopt"}
+"""What extensions are called that compress triangles."""
+
+
 class _Glb:
     """A document, its binary chunk, and the meshes that were read."""
 
@@ -153,7 +157,9 @@ class _Glb:
         needed = self.document.get("extensionsRequired")
         for name in needed if isinstance(needed, list) else ():
             if "compression" in str(name):
-                raise _broken(f"its triangles are compressed ({str(name)[:40]})")
+                how = PACKED.get(str(name), str(name)[:40])
+                remedy = "export it without compression, or as .stl, .step or .3mf"
+                raise UnreadableMesh(f"its triangles are compressed ({how}): {remedy}")
 
     def entry(self, kind: str, number: object) -> Object:
         """An element of one of the document's lists, such as nodes, meshes or accessors."""

@@ -79,6 +79,8 @@ def _loaded(content: bytes, suffix: str) -> list[trimesh.Trimesh]:
 def _obj(content: bytes) -> tuple[Array, Indices]:
     """The vertices and triangles of an OBJ file; a face with more corners becomes a fan of
     triangles. Raises UnreadableMesh with the invalid line."""
+    if (plain := _plain_obj(content)) is not None:
+        return plain
     vertices: list[tuple[float, ...]] = []
     faces: list[tuple[int, ...]] = []
     text = content.decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ")
@@ -99,6 +101,27 @@ def _obj(content: bytes) -> tuple[Array, Indices]:
         message = f"a face has the vertex {max(map(max, faces)) + 1}, but there are {len(vertices)}"
         raise UnreadableMesh(message)
     return np.array(vertices, float).reshape(-1, 3), np.array(faces, np.int64).reshape(-1, 3)
+
+
+def _plain_obj(content: bytes) -> tuple[Array, Indices] | None:
+    """The vertices and triangles of a file of nothing but `v x y z`, `f a b c` and comments, read
+    fast; None if it has anything else, or is not valid."""
+    lines = content.split(b"\n")
+    rows = [[line[2:] for line in lines if line.startswith(kind)] for kind in (b"v ", b"f ")]
+    others = (line for line in lines if not line.startswith((b"v ", b"f ")))
+    if any(line.strip() and not line.startswith(b"#") for line in others):
+        return None
+    try:
+        vertices, faces = (
+            np.array([row.split() for row in some], kind)
+            for some, kind in zip(rows, (float, np.int64), strict=True)
+        )
+    except ValueError:
+        return None
+    shaped = vertices.shape[1:] == faces.shape[1:] == (3,) and max(map(len, rows)) <= MOST
+    if not shaped or not np.isfinite(vertices).all():
+        return None
+    return (vertices, faces - 1) if 0 < faces.min() <= faces.max() <= len(vertices) else None
 
 
 def _vertex(words: list[str], line: int) -> tuple[float, ...]:

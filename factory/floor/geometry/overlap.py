@@ -233,12 +233,17 @@ def _distances(points: Array, body: Any, shared: Any) -> Array:
     corners = vertices[faces]
     near = (corners.max(axis=1) >= box[0] - most).all(axis=1)
     near &= (corners.min(axis=1) <= box[1] + most).all(axis=1)
-    triangles = corners[near]
-    distances = np.full(len(points), most)
+    return np.asarray(np.minimum(most, distances_to(points, corners[near])))
+
+
+def distances_to(points: Array, triangles: Array) -> Array:
+    """The distance (n,) [m] of each point from the nearest of triangles (m, 3, 3); infinite if
+    there are none."""
+    distances = np.full(len(points), np.inf)
     step = max(1, CHUNK // max(1, len(triangles)))
     for first in range(0, len(points) if len(triangles) else 0, step):
         rows = slice(first, first + step)
-        distances[rows] = np.minimum(most, _to_triangles(points[rows], triangles))
+        distances[rows] = _to_triangles(points[rows], triangles)
     return distances
 
 

@@ -28,7 +28,7 @@ from factory.floor.geometry.limits import (
     value_position,
 )
 from factory.floor.geometry.mending import mended
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh, areas_of
+from factory.floor.geometry.mesh_file import ANEW, MeshFile, UnreadableMesh, areas_of
 from factory.floor.geometry.mesh_reader import read_mesh
 from factory.floor.geometry.meshes import (
     SHEETS,
@@ -72,17 +72,24 @@ CELL = 0.06
 
 
 @np.errstate(all="ignore")
-def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})) -> Product:
+def product_geometry(
+    pag: PAG,
+    files: Mapping[str, bytes] = MappingProxyType({}),
+    decomposed: bool = True,
+    report: Callable[[int, int], None] = lambda *_: None,
+) -> Product:
     """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
-    of the PAG. Raises InputError if a mesh cannot be read (BadMesh), or a part is too large, too
-    far away or too heavy for the engine (BadValue)."""
-    reader = _Reader(Path(pag.folder), files)
+    of the PAG. Where it is not `decomposed`, meshes that are not convex have their hulls for
+    bodies. `report` is called with the number of meshes that are read, and of how many. Raises
+    InputError if a mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy
+    for the engine (BadValue)."""
+    reader = _Reader(Path(pag.folder), files, decomposed, report)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
     reader.read([node for node in leaves if node.parameter("mesh") is not None])
     shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in shaped.items() if solid is not None}
-    if entered := stood_in([*solids.values()]):
+    if decomposed and (entered := stood_in([*solids.values()])):
         bored = {_file(node) for node in leaves if node.label in entered}
         again = [(n, i) for i, n in enumerate(leaves) if n.label in solids and _file(n) in bored]
         reader.read([node for node, _ in again], entered=True)
@@ -146,8 +153,15 @@ def _box_in_lattice(
 class _Reader:
     """Reads shapes, and collects errors, and warnings by file. A mesh file is read once."""
 
-    def __init__(self, folder: Path, files: Mapping[str, bytes]) -> None:
-        self.folder, self.files = folder, files
+    def __init__(
+        self,
+        folder: Path,
+        files: Mapping[str, bytes],
+        decomposed: bool,
+        report: Callable[[int, int], None],
+    ) -> None:
+        self.folder, self.files, self.decomposed, self.report = folder, files, decomposed, report
+        self._read: dict[tuple[str, str], MeshFile] = {}
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
@@ -162,13 +176,18 @@ class _Reader:
         opened = {file: self._opened(node, entered) for file, node in first.items()}
         works = dict(opened.values())
         prepared: dict[str, MassProperties | Diagnostic] = {}
+        before = 0
         for keys in _rounds(works):
-            prepared.update(
-                zip(keys, side_by_side([works[key].to_do for key in keys]), strict=True)
-            )
+            tell = partial(self._tell, before, len(works))
+            done = side_by_side([works[key].to_do for key in keys], tell)
+            prepared.update(zip(keys, done, strict=True))
+            before += len(keys)
         for file, (key, _) in opened.items():
             number = self._numbers.setdefault(file, len(self._numbers))
             self._meshes[file] = _named(prepared[key], f"m{number}")
+
+    def _tell(self, before: int, total: int, done: int, _: int) -> None:
+        self.report(before + done, total)
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
         """The solid of a part; None after an error."""
@@ -216,11 +235,13 @@ class _Reader:
         try:
             content, suffix = self._content(path), Path(path).suffix.lower()
             code = program(Path(__file__).parent, *PACKAGES)
-            key = digest(content, suffix, scale, entered, code)
+            key = digest(content, suffix, scale, entered, self.decomposed, code)
             kept = _kept(key)
             if kept is not None:
                 return key, Work(lambda: kept)
-            file = read_mesh(content, suffix)
+            if (path, suffix) not in self._read:
+                self._read[path, suffix] = read_mesh(content, suffix)
+            file = self._read[path, suffix]
         except (OSError, UnreadableMesh) as error:
             why = error.strerror if isinstance(error, OSError) else error
             message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
@@ -229,7 +250,7 @@ class _Reader:
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
             return f"{path} {scale}", Work(partial(too_far, node, "scale", "mesh"))
-        to_do = partial(_finished, key, vertices * scale, faces, entered)
+        to_do = partial(_finished, key, vertices * scale, faces, entered, self.decomposed)
         area = float(areas_of(vertices * scale, faces).sum())
         return key, Work(to_do, (len(vertices), len(faces), round(float(np.log(area)), 3)))
 
@@ -257,15 +278,17 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 
 @np.errstate(all="ignore")
-def _finished(key: str, vertices: Array, faces: Indices, entered: bool) -> MassProperties:
-    """The mesh of a file, with vertices merged, as the engine can use it, in which other parts
-    stand if it is `entered`; it is cached under a key. Its name is "" here: a product names its
-    meshes itself."""
+def _finished(
+    key: str, vertices: Array, faces: Indices, entered: bool, decomposed: bool
+) -> MassProperties:
+    """The mesh of a file, with vertices merged, as the engine can use it if it is `decomposed`, in
+    which other parts stand if it is `entered`; it is cached under a key. Its name is "" here: a
+    product names its meshes itself."""
     mesh, remark = usable("", vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
-        mesh = in_pieces(Mesh(mesh.name, vertices, faces), entered)
+        mesh = in_pieces(Mesh(mesh.name, vertices, faces), entered, decomposed)
         remark = SHEETS if len(mesh.faces) < len(faces) else remark
     prepared = measured(mesh, remark)
     _keep(key, prepared)

@@ -84,12 +84,15 @@ class Product(Keeping):
         low: lower corner of its bounding box [m] (3,).
         high: upper corner [m] (3,).
         warnings: what was found in its shapes.
+        twin: a product with the same parts, and the turn (3, 3) from it, which brings axes onto
+            axes: what was measured of one is not measured again.
     """
 
     solids: Mapping[str, Solid]
     low: Array
     high: Array
     warnings: tuple[Diagnostic, ...] = ()
+    twin: tuple[Product, Array] | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))

@@ -10,14 +10,25 @@ a part than the two share in the finished product *cuts*, whatever its depth.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.floor.geometry.decimation import ENOUGH, Coarse, decimated
 from factory.floor.geometry.meshes import Mesh, hull_of, is_closed, volume_of
-from factory.floor.geometry.overlap import SAMPLES, Common, common, drawn, swept, united
+from factory.floor.geometry.overlap import (
+    SAMPLES,
+    Common,
+    bounded,
+    common,
+    drawn,
+    swept,
+    united,
+)
+from factory.floor.geometry.solids import Product, rotation
 from factory.floor.mating.bodies import ConvexBodies
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.support.arrays import Array, Indices
@@ -28,16 +39,38 @@ ALIKE = 1e-6
 QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
 
+DECIMATED = 1e-4
+"""How far a decimated part may be from the part [m], where a coarse look may suffice."""
+
 
 class _Measurements:
-    """Measurements of some parts of a product, by label: the sweep of each, and the penetration
-    depth of two; and whether meshes, by identity, are rough or wider."""
+    """Measurements of some parts of a product, by label: the sweep of each, the penetration depth
+    of two, and decimated bodies; and whether meshes, by identity, are rough or wider."""
 
-    def __init__(self, *_: object) -> None:
+    def __init__(self, product: Product, parts: frozenset[str]) -> None:
         self.sweeps: dict[tuple[str, int, int], Any] = {}
         self.finished: dict[tuple[str, str], Common] = {}
         self.pairs: dict[tuple[str, str, bool, int], tuple[Any, ...]] = {}
+        self.decimated: dict[int, Coarse] = {}
+        self.coarse: dict[str, Coarse] = {}
+        self.free: set[tuple[str, str, int, int]] = set()
+        self.rough_sweeps: dict[tuple[str, int, int], Any] = {}
         self.kinds: dict[int, tuple[bool, bool]] = {}
+        if product.twin is not None and parts == frozenset(product.twin[0].solids):
+            self._take(product.twin[0].kept(_Measurements, parts), product.twin[1])
+
+    def _take(self, other: _Measurements, turn: Array) -> None:
+        """Take what was measured of the parts before a turn (3, 3): which ways are free and, if it
+        is none, how deep they are."""
+        place = np.column_stack([turn, np.zeros(3)])
+        for label, coarse in other.coarse.items():
+            self.coarse[label] = replace(coarse, body=coarse.body.transform(place))
+        if np.array_equal(turn, np.eye(3)):
+            self.pairs, self.sweeps, self.finished = other.pairs, other.sweeps, other.finished
+        for one, standing, axis, sign in other.free:
+            onto = int(np.abs(turn[:, axis]).argmax())
+            side = sign if turn[onto, axis] > 0 else -sign
+            self.free.add((one, standing, onto, side))
 
 
 class DrawnWays:
@@ -103,7 +136,8 @@ class DrawnWays:
         rooms = np.empty((len(moving), 2))
         for row, (one, other) in enumerate(zip(moving.tolist(), standing.tolist(), strict=True)):
             for column, sign in enumerate(SIGNS):
-                depth = self._path(one, other, axis, sign)[0]
+                met = self._path(one, other, axis, sign)
+                depth = met[0] if met else 0.0
                 gap = self._gap(one, other, axis, sign, most) if depth <= TOLERANCE else -depth
                 rooms[row, column] = gap
         return rooms
@@ -111,9 +145,13 @@ class DrawnWays:
     def near(self, one: Indices, other: Indices, gap: float) -> NDArray[np.bool_]:
         """Which pairs of parts (n,) are at most so far from each other in the finished product."""
         pairs = zip(one.tolist(), other.tolist(), strict=True)
-        return np.array(
-            [self._body(a).min_gap(self._body(b), 2 * gap) <= gap for a, b in pairs], bool
-        )
+        return np.array([self._is_near(a, b, gap) for a, b in pairs], bool)
+
+    def _is_near(self, one: int, other: int, gap: float) -> bool:
+        coarse, margin = [self._coarse(part) for part in (one, other)], self._margin(one, other)
+        if margin and coarse[0].body.min_gap(coarse[1].body, gap + 2 * margin) > gap + margin:
+            return False
+        return bool(self._body(one).min_gap(self._body(other), 2 * gap) <= gap)
 
     def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         key = self._labels[moving], self._labels[standing], still, axis
@@ -127,14 +165,61 @@ class DrawnWays:
             return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2, [False] * 2
         path, shift, graze, cuts = [], [], [], []
         for sign in SIGNS:
-            depth, at = self._path(moving, standing, axis, sign)
+            clear = self._is_free(moving, standing, axis, sign)
+            coarse = (0.0, 0.0) if clear else self._coarsely(moving, standing, axis, sign)
+            met = coarse or self._path(moving, standing, axis, sign)
+            depth, at = met or (0.0, 0.0)
             free = depth <= TOLERANCE
             path.append(max(depth, finished))
             shift.append(at)
-            graze.append(-self._gap(moving, standing, axis, sign, CLEAR) if free else depth)
+            gap = CLEAR if coarse else self._gap(moving, standing, axis, sign, CLEAR)
+            graze.append(-gap if free else depth)
             is_deeper = depth > finished + TOLERANCE
-            cuts.append(not is_deeper and self._cuts(moving, standing, axis, sign))
+            may_cut = met is not None and met is not coarse and not is_deeper
+            cuts.append(may_cut and self._cuts(moving, standing, axis, sign))
+            if depth == 0.0 and gap >= CLEAR and not cuts[-1]:
+                pair = self._labels[moving], self._labels[standing]
+                self._found.free |= {(*pair, axis, sign), (*pair[::-1], axis, -sign)}
         return finished, path, shift, graze, cuts
+
+    def _is_free(self, moving: int, standing: int, axis: int, sign: int) -> bool:
+        """Whether it is known that the first part passes the second with room."""
+        return (self._labels[moving], self._labels[standing], axis, sign) in self._found.free
+
+    def _coarsely(
+        self, moving: int, standing: int, axis: int, sign: int
+    ) -> tuple[float, float] | None:
+        """How deep the first part gets into the second on its way, and where [m], if that is clear
+        from decimated bodies, and how far these are from the parts: it passes with room,
+        or the two clash deeply and are apart in the end. None if it is not."""
+        margin = self._margin(moving, standing)
+        if not margin or self.finished(moving, standing).depth > TOLERANCE:
+            return None
+        sweep, body = self._rough_sweep(moving, axis, sign), self._coarse(standing).body
+        cut = common(sweep, body, both=False, samples=QUICK)
+        if cut.depth > SURELY + margin:
+            return cut.depth, self._shift(cut, moving, axis, sign)
+        ahead = sweep.translate(sign * LAST * np.eye(3)[axis])
+        passes = not cut.volume and ahead.min_gap(body, CLEAR + 2 * margin) > CLEAR + margin
+        return (0.0, 0.0) if passes else None
+
+    def _margin(self, one: int, other: int) -> float:
+        """How much a distance of two decimated parts may be off [m]; 0 if neither is decimated. It
+        is twice what is measured, which is measured at some points only."""
+        return 2 * (self._coarse(one).far + self._coarse(other).far)
+
+    def _coarse(self, part: int) -> Coarse:
+        solid, coarse = self._solids[part], self._found.coarse
+        if solid.label not in coarse:
+            body, meshes = self._body(part), self._found.decimated
+            if solid.mesh is None or body.num_tri() <= ENOUGH:
+                return coarse.setdefault(solid.label, Coarse(body))
+            key = id(solid.mesh)
+            if key not in meshes:
+                meshes[key] = decimated(bounded(solid.mesh.vertices, solid.mesh.faces), DECIMATED)
+            place = np.column_stack([rotation(solid.quaternion), solid.position])
+            coarse[solid.label] = Coarse(meshes[key].body.transform(place), meshes[key].far)
+        return coarse[solid.label]
 
     def finished(self, one: int, other: int) -> Common:
         """The overlap of two parts in the finished product."""
@@ -155,12 +240,12 @@ class DrawnWays:
         is_more = bool(cut.volume() > most)
         return is_more and united(part ^ body for part in sweep.decompose()) > most
 
-    def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
-        """How deep the first part gets into the second on its way, and where [m]. The depth of a
-        clash that is deep may be found too small."""
+    def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float] | None:
+        """How deep the first part gets into the second on its way, and where [m]; None if they do
+        not meet. The depth of a clash that is deep may be found too small."""
         cut = self._cut(moving, standing, axis, sign, QUICK)
         if cut is None:
-            return 0.0, 0.0
+            return None
         finished = self.finished(moving, standing).depth
         if cut.depth <= SURELY or finished > TOLERANCE:
             both = [
@@ -194,10 +279,20 @@ class DrawnWays:
         return drawn(self._solids[part])
 
     def _swept(self, part: int, axis: int, sign: int) -> Any:
-        key, sweeps = (self._labels[part], axis, sign), self._found.sweeps
+        return self._sweep(self._found.sweeps, self._body(part), (self._labels[part], axis, sign))
+
+    def _rough_sweep(self, part: int, axis: int, sign: int) -> Any:
+        body, far = self._coarse(part).body, self._coarse(part).far
+        if far == 0:
+            return self._swept(part, axis, sign)
+        return self._sweep(self._found.rough_sweeps, body, (self._labels[part], axis, sign))
+
+    def _sweep(
+        self, sweeps: dict[tuple[str, int, int], Any], body: Any, key: tuple[str, int, int]
+    ) -> Any:
         if key not in sweeps:
-            out = sign * self._beyond * np.eye(3)[axis]
-            sweeps[key] = swept(self._body(part), out)
+            _, axis, sign = key
+            sweeps[key] = swept(body, sign * self._beyond * np.eye(3)[axis])
         return sweeps[key]
 
 

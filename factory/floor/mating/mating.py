@@ -33,14 +33,16 @@ def matings(
     product: Product,
     lifts: bool = True,
     lowered: Mapping[str, str] = MappingProxyType({}),
+    as_drawn: bool = False,
 ) -> Matings:
     """Judges every operation with two inputs or more, with `lifts` or without. Near-linear in the
     parts, except where very many lie behind one another. `lowered`: by operations the input that is
-    to be lowered if it can be, even where it could slide."""
+    to be lowered if it can be, even where it could slide. `as_drawn`: the bodies that collide for
+    parts that are tested as they are drawn are not compared: runs alone need what they overlap."""
     met = meetings(nodes)
     if not met.all:
         return Matings((), {})
-    finder = Finder(bodies(product, met.parts), met)
+    finder = Finder(bodies(product, met.parts), met, as_drawn)
     judge = _Judge(met, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
         judge.slide(axis, finder.along(axis, met.axes == axis))

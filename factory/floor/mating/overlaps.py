@@ -17,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry import overlap
-from factory.floor.mating.bodies import BodyShapes, ConvexBodies
+from factory.floor.mating.bodies import ROUNDING, BodyShapes, ConvexBodies
+from factory.floor.mating.boxes import box_depths
 from factory.floor.mating.drawn import DrawnWays
 from factory.floor.mating.meetings import Meetings
 from factory.floor.mating.paths import (
     CLEAR,
-    LAST,
     MANY,
-    SIGNS,
     TOLERANCE,
+    WAYS,
     Depths,
     depths_of,
     sought,
@@ -126,10 +126,12 @@ Pairs = tuple[Indices, Indices, Indices, Depths]
 
 
 class Finder:
-    """Finds overlaps in one product; shapes are kept with it, what is found in the user's cache."""
+    """Finds overlaps in one product; shapes are kept with it, what is found in the user's cache.
+    `as_drawn`: of parts that are tested as they are drawn, only that: their bodies are not compared
+    but by their boxes."""
 
-    def __init__(self, convex: ConvexBodies, where: Meetings) -> None:
-        self.bodies, self.meetings = convex, where
+    def __init__(self, convex: ConvexBodies, where: Meetings, as_drawn: bool = False) -> None:
+        self.bodies, self.meetings, self.as_drawn = convex, where, as_drawn
         self.drawn = DrawnWays(convex)
         self._shapes = convex.product.kept(BodyShapes)
 
@@ -160,28 +162,59 @@ class Finder:
         where = self.meetings.borders, self.meetings.levels, self.meetings.splits
         code = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
         exact = program(Path(overlap.__file__).parent)
-        return digest(code, exact, self.bodies.part, *where, *self.bodies.vertices, *self._meshes)
+        asked = code, exact, self.as_drawn, self.bodies.part
+        return digest(*asked, *where, *self.bodies.vertices, *self._meshes)
 
     def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Pairs, Pairs, Flags]:
         """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
         do; the parts that were tested as they are drawn; and which are known by hulls alone."""
         parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
-        moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
-        depths = _box_depths(self.bodies, moving, standing, axis)
+        rows = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
+        rows = rows[:, self._meets(rows, axis)]
+        moving, standing, meeting = rows
+        depths = box_depths(self.bodies, moving, standing, axis)
         self._refine(moving, standing, axis, depths)
         part = self.bodies.part
         idle = part[moving] < self.meetings.splits[meeting]
         depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
         depths.graze[idle] = -np.inf
         kept = np.array(depths.faulty.any(axis=1))
-        tested = np.flatnonzero(self.drawn.tested(part[moving], part[standing]))
-        key = self._key_of(meeting[tested], part[moving[tested]], part[standing[tested]])
-        first = tested[np.unique(key, return_index=True)[1]]  # of each pair of parts
+        first = self._firsts(rows)
         kept[first] = True
         by_parts = part[moving[first]], part[standing[first]]
         exact = self.drawn.depths(*by_parts, idle[first], axis)
         by_bodies = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
         return by_bodies, (meeting[first], *by_parts, exact), self.drawn.rough
+
+    def _firsts(self, rows: Indices) -> Indices:
+        """Of rows moving, standing, meeting (3, n) the first of each pair of parts that is tested
+        as it is drawn."""
+        moving, standing = self.bodies.part[rows[:2]]
+        tested = np.flatnonzero(self.drawn.tested(moving, standing))
+        key = self._key_of(rows[2, tested], moving[tested], standing[tested])
+        return np.asarray(tested[np.unique(key, return_index=True)[1]])
+
+    def _meets(self, rows: Indices, axis: int) -> Flags:
+        """Which rows (n,) may overlap or scrape, by how far their bodies reach along WAYS; the
+        first of each pair of parts that is tested as it is drawn stays."""
+        meets = np.ones(rows.shape[1], bool)
+        if self.as_drawn or self.bodies.boxes.all():
+            return meets
+        other = np.flatnonzero(~self.bodies.boxes[rows[:2]].all(axis=0))
+        moving, standing = rows[:2, other]
+        heights = self._reach[moving] + self._reach[standing, ::-1]
+        meets[other] = depths_of(heights + ROUNDING, WAYS[:, axis])[0].faulty.any(axis=1)
+        meets[self._firsts(rows)] = True
+        return meets
+
+    @cached_property
+    def _reach(self) -> Array:
+        """How far each body (n, k) reaches along WAYS, each of which has its opposite in the
+        reverse order [m]."""
+        counts = [len(vertices) for vertices in self.bodies.vertices]
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]]).astype(np.int64)
+        points = np.concatenate(self.bodies.vertices) @ WAYS.T
+        return np.asarray(np.maximum.reduceat(points, starts))
 
     def _key_of(self, meeting: Indices, moving: Indices, standing: Indices) -> Indices:
         """A number (n,) of each pair of parts at a meeting, ascending as they are sorted."""
@@ -224,7 +257,7 @@ class Finder:
         finished product, with their depths."""
         pairs = [self._beside(axis, gap, still, *pair) for pair in self._chunks(axis, gap)]
         one, other = np.concatenate([np.zeros((2, 0), np.int64), *pairs], axis=1)
-        depths = _box_depths(self.bodies, one, other, axis)
+        depths = box_depths(self.bodies, one, other, axis)
         self._refine(one, other, axis, depths)
         return one, other, depths
 
@@ -248,7 +281,7 @@ class Finder:
     def _beside(
         self, axis: int, gap: float, still: bool, moving: Indices, standing: Indices
     ) -> Indices:
-        depths = _box_depths(self.bodies, moving, standing, axis)
+        depths = box_depths(self.bodies, moving, standing, axis)
         near = depths.finished if still else depths.path.max(axis=1)
         return np.asarray(np.stack([moving, standing])[:, near >= -gap])
 
@@ -259,15 +292,17 @@ class Finder:
         standing, meeting (3, n)."""
         meeting = self.meetings.of(self.bodies.part[standing], self.bodies.part[moving])
         pairs = np.stack([moving, standing, meeting])[:, wanted[meeting]]
-        depths = _box_depths(self.bodies, pairs[0], pairs[1], axis)
+        depths = box_depths(self.bodies, pairs[0], pairs[1], axis)
         return np.asarray(pairs[:, depths.faulty.any(axis=1)])
 
     def _refine(self, moving: Indices, standing: Indices, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
         keys = [key for solid in self.bodies.solids for key in self._shapes.keys[solid.label]]
-        both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
-        for row in np.flatnonzero(~both).tolist():
+        settled = self.bodies.boxes[moving] & self.bodies.boxes[standing]
+        if self.as_drawn:
+            settled |= self.drawn.tested(self.bodies.part[moving], self.bodies.part[standing])
+        for row in np.flatnonzero(~settled).tolist():
             groups.setdefault((keys[moving[row]], keys[standing[row]]), []).append(row)
         low = self.bodies.low
         for pair, members in groups.items():
@@ -317,22 +352,3 @@ class Finder:
 def _pairs(kept: Mapping[str, NDArray[Any]], keys: Sequence[str]) -> Pairs:
     meeting, moving, standing, *rest = (kept[key] for key in keys)
     return meeting, moving, standing, Depths(*rest)
-
-
-def _box_depths(bodies: ConvexBodies, moving: Indices, standing: Indices, axis: int) -> Depths:
-    """The depths of bounding boxes (see `depth.py`), in closed form."""
-    low, high = bodies.low, bodies.high
-    up, down = high[standing] - low[moving], high[moving] - low[standing]
-    depth = np.minimum(up, down)
-    across = np.delete(depth, axis, axis=1).min(axis=1)[:, None]
-    half = ((up[:, axis] + down[:, axis]) / 2)[:, None]
-    ahead = (up[:, axis] - down[:, axis])[:, None] * np.array(SIGNS) / 2
-
-    def most(ahead: Array) -> Array:
-        along = np.where(ahead > 0, half, half - np.abs(ahead))
-        return np.asarray(np.minimum(across, along))
-
-    path = most(ahead)
-    shift = np.where(ahead > 0, np.maximum(ahead - (half - path), 0.0), 0.0)
-    finished = np.minimum(across[:, 0], depth[:, axis])
-    return Depths(finished, path, shift, most(ahead - LAST), np.zeros(path.shape, bool))

@@ -238,3 +238,13 @@ def test_damaged_files_are_refused_in_our_words(tmp_path: Path, suffix: str) -> 
         except FactoryError:
             refused += 1
     assert refused > 15
+
+
+def test_compression_is_called_what_it_is() -> None:
+    """Of a file whose triangles a decoder must unpack first, before its accessors are looked at."""
+    document = b'{"asset":{"version":"2.0"},"extensionsRequired":["KHR_draco_mesh_compression"]}'
+    document += b" " * (-len(document) % 4)
+    chunk = len(document).to_bytes(4, "little") + b"JSON" + document
+    content = b"glTF" + (2).to_bytes(4, "little") + (12 + len(chunk)).to_bytes(4, "little") + chunk
+    with pytest.raises(UnreadableMesh, match=r"compressed \(Draco\).*export it without"):
+        glb_reader.read_glb(content)

@@ -140,7 +140,8 @@ def plan(
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
-    project = with_lines(read(files[0], folders), planned.lines)
+    written = read(files[0], folders)
+    project = with_lines(written.with_product(written.product, as_drawn=True), planned.lines)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     announced_before = set(map(id, project.product.warnings))
