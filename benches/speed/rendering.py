@@ -43,7 +43,10 @@ def work(robots: int, frames: int) -> dict[str, Any]:
     run_until(simulation, Steady.of(layout, None).since)
     moments = recorded(simulation, frames)
     subject = MonitorSubject.of_run(simulation)
-    take = Take(simulation.world.m, subject, "product", 1, Picture(SIZE), History(subject))
+    made, picture = simulation.model, Picture(SIZE)
+    assert made is not None
+    drawn = simulation.physical.m, made.xml, made.files
+    take = Take(*drawn, subject, "product", 1, picture, History(subject))
     return {
         "robots": len(layout.factory.robots),
         "bodies": simulation.world.m.nbody,

@@ -160,10 +160,9 @@ class Timing:
         [m]: tours differ in both."""
         lift, gear = self.factory.lift_axis[robot], self.factory.robots[robot].operations
         after = gear[(gear.index(number) + 1) % len(gear)]
+        axes, stroke = self.factory.axes, self.layout.strokes[robot]
         low, top = (
-            float(self.modes[n].goals[self.factory.axes[n].index(lift)])
-            if lift in self.factory.axes[n]
-            else self.layout.strokes[robot]
+            float(self.modes[n].goals[axes[n].index(lift)]) if lift in axes[n] else stroke
             for n in (number, after)
         )
         return low, top

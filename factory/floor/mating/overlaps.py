@@ -21,15 +21,7 @@ from factory.floor.mating.bodies import ROUNDING, BodyShapes, ConvexBodies
 from factory.floor.mating.boxes import box_depths
 from factory.floor.mating.drawn import DrawnWays
 from factory.floor.mating.meetings import Meetings
-from factory.floor.mating.paths import (
-    CLEAR,
-    MANY,
-    TOLERANCE,
-    WAYS,
-    Depths,
-    depths_of,
-    sought,
-)
+from factory.floor.mating.paths import CLEAR, MANY, TOLERANCE, WAYS, Depths, depths_of, sought
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, program, store_arrays
 
