@@ -21,6 +21,9 @@ FIT = 0.15
 POSTS = [(x, y) for x in (-24.0, 24.0) for y in (-15.0, 15.0)]
 """Where the screws are."""
 
+LEDGES = [(x, y) for x in (-16.0, 16.0) for y in (-9.0, 9.0)]
+"""Where the board lies on the case."""
+
 
 def box(x: float, y: float, z: float, low: float = 0.0) -> Manifold:
     """A box centred in x and y, from a height on."""
@@ -33,8 +36,10 @@ def rod(radius: float, low: float, high: float, at: tuple[float, float] = (0, 0)
 
 
 def case() -> Manifold:
-    """A tub with a post for each screw, drilled."""
+    """A tub with a drilled post for each screw, and ledges for the board."""
     made = box(60, 42, 26) - box(54, 36, 26, 3)
+    for at in LEDGES:
+        made = made + rod(3, 3, 10, at)
     for at in POSTS:
         made = made + rod(4, 3, 20, at) - rod(1.5, 8, 27, at)
     return made
@@ -57,7 +62,7 @@ def parts() -> dict[str, Manifold]:
     """The parts by their names."""
     made = {
         "case": case(),
-        "battery": box(34, 20, 7, 3),
+        "battery": box(24, 20, 6, 3),
         "board": box(38, 24, 2, 10),
         "sensor": box(12, 12, 8, 12),
         "lid": lid(),

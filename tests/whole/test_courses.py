@@ -73,7 +73,7 @@ def test_each_step_has_its_own_setpoints(name: str, ticks: int) -> None:
 
     looked, moved = 0, 0
     with stepping(step):
-        for _ in range(150 if ticks == 1 else 40):
+        for _ in range(150 if ticks == 1 else 60):
             x, v, begun = motion.robots.x.copy(), motion.robots.v.copy(), world.time
             seen.clear()
             supervisor.step(ticks)

@@ -19,7 +19,7 @@ from factory.apps.exports.ways import ways
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
 from factory.engine.simulation.ordering import Ordering
-from factory.floor.layout import presence
+from factory.floor.layout import nearness
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.exclusions import awaited_positions, coordinated, exclusions
@@ -146,19 +146,19 @@ def test_what_a_unit_made_alone_needs_at_once_is_refused() -> None:
 def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same answer as each by itself, and as by all facets where faces tell enough."""
     layout, clearance = read("examples/lamp.pag").layout, 0.05
-    net, back, judge = coordinated(layout), awaited_positions(layout), presence.Nearness(clearance)
-    pairs = [*presence.near([*presences(layout, net, back)], clearance)]
+    net, back, judge = coordinated(layout), awaited_positions(layout), nearness.Nearness(clearance)
+    pairs = [*nearness.near([*presences(layout, net, back)], clearance)]
     judged = [judge.nearer(pair) for pair in pairs]
     assert any(judged) and not all(judged)
-    monkeypatch.setattr(presence, "rough", presence.exact)
-    assert judged == [presence.nearer(pair, clearance) for pair in pairs]
-    monkeypatch.setattr(presence, "exact", None)
+    monkeypatch.setattr(nearness, "rough", nearness.exact)
+    assert judged == [nearness.nearer(pair, clearance) for pair in pairs]
+    monkeypatch.setattr(nearness, "exact", None)
     again = [*presences(layout, net, back)]
-    for pair in presence.near(again, clearance):
+    for pair in nearness.near(again, clearance):
         judge.nearer(pair)
     moved = [replace(one, bodies=one.bodies.moved(np.full(3, 1e-4))) for one in again]
     with pytest.raises(TypeError):
-        for pair in presence.near(moved, clearance):
+        for pair in nearness.near(moved, clearance):
             judge.nearer(pair)
 
 
