@@ -164,18 +164,18 @@ def test_contacts_are_seen_that_are_seen_one_by_one(step: Callable[..., None]) -
 @pytest.mark.parametrize("name", ["chest", "fence", "20"])
 def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None:
     """Something fires, a mode may have come to its goal, a stride is over, the tray is under way,
-    a slider is up, or a part or hand that is waited for may have come or gone."""
+    a slider is up, or a part, hand or robot that is waited for may have come or gone."""
     simulation = ready(name)
     supervisor, world = simulation.supervisor, simulation.physical
     for_a_reason, tray = True, False
     while world.delivered() < 2:
         fired, sliders = len(supervisor.events), world.motion.sliders
-        up = sliders.up
+        due = min(sliders.up, world.parts.feeders.clear_from)
         supervisor.step(MOST)
         assert for_a_reason or len(supervisor.events) > fired
         before, tray = tray, world.motion.outfeed.moves
         stride_is_over = not world.motion.robots.left
-        for_a_reason = stride_is_over or supervisor.near or before or tray or up <= sliders.now
+        for_a_reason = stride_is_over or supervisor.near or before or tray or due <= sliders.now
         held, at = supervisor.ordering.held, world.motion.robots.x
         may_be_past = [(past.at - at[past.axis]) * past.direction <= AHEAD for past in held]
         for_a_reason |= world.supplied or supervisor.enabled or any(may_be_past)
