@@ -158,9 +158,9 @@ class Feeders:
         taken = [self._number[o.label] for o in operations if o.label in self._number]
         self._send(np.array(taken, np.intp), down=False)
 
-    def tend(self) -> bool:
+    def tend(self, moving: Index) -> bool:
         """Let the next parts come down from housings whose sliders are up and whose robots are out
-        of the way. Returns whether an awaited part does."""
+        of the way. `moving`: the axes under way. Returns whether an awaited part comes."""
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
@@ -170,7 +170,7 @@ class Feeders:
         waiting = [number for number in idle if not is_clear[number]]
         self.clear_from = NEVER
         if waiting:
-            self.clear_from = self._sliders.now + self._passing.until_clear(waiting)
+            self.clear_from = self._sliders.now + self._passing.until_clear(waiting, moving)
         if free:
             late = self._obstructed()
             free = [number for number in free if number not in late]

@@ -109,12 +109,16 @@ class Passing:
         self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
-    def until_clear(self, numbers: Sequence[int]) -> float:
-        """No robot of some outlets that is in the way is out of it before so long [s]."""
-        at = self._at()[0][numbers]
-        home = self._home[numbers] - HOME - at
-        ways = np.where(self._first[numbers], home, at - self._clear[numbers])
-        return float(np.maximum(ways, 0.0).min()) / self._fastest.speed
+    def until_clear(self, numbers: Sequence[int], moving: Index) -> float:
+        """No robot of some outlets that is in the way is out of it before so long [s], if these
+        axes alone are `moving`. One whose hand must be there first delivers its part before that:
+        the end of an operation tells."""
+        (x, v), first, carriers = self._at(), self._first[numbers], self._carriers[numbers]
+        goes = np.isin(carriers, moving) & ~(first & self.holds[numbers])
+        ways = np.where(first, self._home[numbers] - HOME - x[numbers], (x - self._clear)[numbers])
+        speeds = np.where(first, v[numbers], -v[numbers])
+        least = self._fastest.least(np.maximum(ways[goes], 0.0), np.maximum(speeds[goes], 0.0))
+        return float(least.min(initial=np.inf))
 
     def soonest(self, number: int) -> float:
         """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part

@@ -237,7 +237,7 @@ class MujocoWorld:
         if feeders.due <= self.motion.sliders.now:
             feeders.due, self.supplied = NEVER, True
         if min(self.motion.sliders.up, feeders.clear_from) <= self.motion.sliders.now:
-            self.supplied |= feeders.tend()
+            self.supplied |= feeders.tend(self.motion.active)
         if outfeed.busy and outfeed.rests():
             self.supplied = True
             if unit is None:
@@ -263,7 +263,7 @@ class MujocoWorld:
         """Make the checks that follow a change of modes, and come about once in a stride."""
         self._unseen = 0
         self.inspection.welds()
-        self.supplied |= self.parts.feeders.tend()
+        self.supplied |= self.parts.feeders.tend(self.motion.active)
         if self.parts.joining.waiting and self.dropped is None:
             self.parts.joining.settle(self.time)
 
