@@ -359,7 +359,7 @@ def test_the_file_is_plain_mjcf(paper: Layout) -> None:
     root = ElementTree.fromstring(xml)
     assert [child.tag for child in root] == [
         *("compiler", "option", "size", "visual", "statistic", "default", "asset", "worldbody"),
-        *("equality", "actuator", "sensor"),
+        *("equality", "actuator", "sensor", "keyframe"),
     ]
     assert sum(1 for _ in root.iter()) <= len(xml.splitlines())
     assert xml.isascii()

@@ -227,7 +227,7 @@ def test_commands_options_codes_and_products_are_completed(
 def test_cameras_are_completed_with_the_labels_of_the_file(
     completions: Completions, run: Terminal, tmp_path: Path
 ) -> None:
-    cameras = ["overview", "orbit", "top", "product"]
+    cameras = ["tour", "overview", "orbit", "top", "product"]
     labels = ["part1", "part2", "part3", "sub1", "sub2", "sub3"]
     parts = [f"part:{label}" for label in labels[:3]]
     taken = [f"handover:{label}" for label in labels]
