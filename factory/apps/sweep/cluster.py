@@ -48,9 +48,13 @@ def over_cluster(
     RunError where no scheduler answers or it is lost, or for workers with other versions.
     """
     client = connected(address)
+    from distributed.comm import CommClosedError
+
     try:
         check_workers(client)
         yield from _results(client, work, items)
+    except CommClosedError as error:
+        raise _lost() from error
     finally:
         with suppress(Exception):
             client.close(timeout=5)
@@ -133,5 +137,9 @@ def _worked(future: Any, number: int) -> Worked[Any]:
         return Worked(number, None, error.allowed_failures + 1)
     if error is not None:
         raise error
+    raise _lost()
+
+
+def _lost() -> RunError:
     hint = "call again: what is written is kept"
-    raise RunError(Diagnostic("Missing", "the Dask scheduler was lost", None, hint))
+    return RunError(Diagnostic("Missing", "the Dask scheduler was lost", None, hint))

@@ -121,7 +121,7 @@ def test_the_client_or_the_scheduler_is_killed(
         for process in cluster.started:
             process.kill()
         _, told = begun.communicate(timeout=SOON)
-        assert begun.returncode == RunError.exit_status
+        assert begun.returncode == RunError.exit_status, told
         assert b"the Dask scheduler was lost" in told
         cluster.scheduler()
         cluster.worker()
