@@ -326,7 +326,7 @@ def test_watchers_make_it_fail(running: Running) -> None:
 
 
 def test_with_spares_robots_can_die() -> None:
-    words = ("view", PAPER, "--spares", 1, "--swap", 1, "--port", 0, "--json")
+    words = ("view", PAPER, "--spares", 1, "--swap", 30, "--port", 0, "--json")
     with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
         address = json.loads(process.stdout.readline())["address"].replace("http", "ws") + "live"
         with websockets.connect(address, proxy=None) as watcher:
