@@ -33,10 +33,10 @@ def untouched(m: mujoco.MjModel, geoms: Index, parts: Mapping[int, Index]) -> li
         return []
     count = max(len(targets), len(bodies))
     probes.put([*islice(cycle(bodies), count)], [*islice(cycle(targets), count)])
-    for _ in range(2):
+    for turn in (1, 2):
         loose = [geom for geom in targets if geom not in probes.touched]
-        good = [body for body in bodies if probes.touches(body)]
-        probes.put([*islice(cycle(good or bodies), len(loose))], loose)
+        good = [body for body in bodies if probes.touches(body)] or bodies
+        probes.put([*islice(cycle(good), turn, turn + len(loose))], loose)
         bad = [body for body in bodies if not probes.touches(body)]
         solid = [geom for geom in targets if geom in probes.touched] or targets
         probes.put(bad, [*islice(cycle(solid), len(bad))])
