@@ -4,6 +4,7 @@ beside the run and from its log; honest runs succeed."""
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from factory.engine.mjcf import loading, names
 from factory.engine.mjcf.model import Model
 from factory.engine.record.findings import Report, Violation
 from factory.engine.record.verdict import LIMITS, RunVerdict, judged
+from factory.engine.simulation.mujoco import probing
 from factory.engine.simulation.mujoco import world as mujoco_world
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -434,3 +436,25 @@ def test_what_comes_first_is_the_cause_and_is_told_first() -> None:
 def test_figures_that_are_no_numbers_fail() -> None:
     """An error that is nan is no small error."""
     assert not judged(None, True, {"product_error_max_mm": float("nan")}, None).succeeded
+
+
+def test_what_finds_no_contact_is_tried_with_other_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A floor that one part does not touch was tried with that part three times."""
+    tried: list[tuple[int, int]] = []
+
+    class Probes:
+        touched = frozenset[int]()
+
+        def __init__(self, *_: object) -> None: ...
+
+        def touches(self, body: int) -> bool:
+            return True
+
+        def put(self, bodies: Sequence[int], geoms: Sequence[int]) -> None:
+            tried.extend(zip(bodies, geoms, strict=True))
+
+    monkeypatch.setattr(probing, "_Probes", Probes)
+    parts = {body: np.array([body]) for body in (14, 15, 16)}
+    assert probing.untouched(None, np.arange(5), parts) == [0, 1, 2, 3, 4]  # type: ignore[arg-type]
+    for geom in range(5):
+        assert {body for body, at in tried if at == geom} == {14, 15, 16}
