@@ -3,10 +3,10 @@ controller that is not ours: where which actuators have to be, and which welds a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from factory.api import NOPART, Factory, Model, Operation, names
+from factory.api import NOPART, Model, Operation, names
 from factory.apps.exports.stock import scales_of
 from factory.floor.modes.modes import operation_modes
 
@@ -48,37 +48,20 @@ def goals(model: Model) -> Json:
                 "goals": {name: round(at, 12) for name, at in places(operation)},
                 **_welds(model, operation),
             }
-            for operation in _in_order(layout.factory)
+            for operation in map(layout.factory.operations.__getitem__, layout.factory.order)
         ]
     }
-
-
-def _in_order(factory: Factory) -> Iterator[Operation]:
-    """The operations of a period, each after all that must have ended before it."""
-    next_one = [0] * len(factory.robots)
-    left = [*factory.operations]
-    while left:
-        for operation in reversed(left):
-            turns = (factory.robots[r].operations[next_one[r]] for r in operation.robots)
-            if all(number == operation.index for number in turns):
-                break
-        left.remove(operation)
-        for robot in operation.robots:
-            next_one[robot] = (next_one[robot] + 1) % len(factory.robots[robot].operations)
-        yield operation
 
 
 def _welds(model: Model, operation: Operation) -> Json:
     """The names of the welds that go on and off as an operation ends."""
     robots, carried = model.factory.robots, model.carried.carried
-    held = [
-        {names.grip(robots[robot].name, label) for label in carried.get(of, ())}
-        for robot, of in zip(operation.robots * 2, operation.before + operation.after, strict=True)
-    ]
-    before, after = (
-        set().union(*held[: len(operation.robots)]),
-        set().union(*held[len(operation.robots) :]),
-    )
+
+    def grips(labels: Sequence[str]) -> set[str]:
+        pairs = zip(operation.robots, labels, strict=True)
+        return {names.grip(robots[r].name, x) for r, of in pairs for x in carried.get(of, ())}
+
+    before, after = grips(operation.before), grips(operation.after)
     if not operation.inputs:
         before |= {names.feed(operation.label)}
     elif all(label == NOPART for label in operation.after):

@@ -158,8 +158,7 @@ class Timing:
     def _rise(self, robot: int, number: int) -> tuple[float, float]:
         """From where an operation (index) leaves the lift of a robot to where the next one takes it
         [m]: tours differ in both."""
-        lift, gear = self.factory.lift_axis[robot], self.factory.robots[robot].operations
-        after = gear[(gear.index(number) + 1) % len(gear)]
+        lift, after = self.factory.lift_axis[robot], self.factory.after(robot, number)
         axes, stroke = self.factory.axes, self.layout.strokes[robot]
         low, top = (
             float(self.modes[n].goals[axes[n].index(lift)]) if lift in axes[n] else stroke
@@ -171,9 +170,8 @@ class Timing:
         """The ticks in which the lift of a robot that is at home is set for its next tour."""
         if robot not in self.factory.adjusted:
             return 0
-        gear = self.factory.robots[robot].operations
-        after = gear[(gear.index(number) + 1) % len(gear)]
-        one, other = (self.layout.visits[n, robot].up for n in (number, after))
+        both = number, self.factory.after(robot, number)
+        one, other = (self.layout.visits[n, robot].up for n in both)
         lift = self.axis_drive(self.factory.lift_axis[robot], AS_IT_IS)
         return lift.way(abs(one - other)).rests(self.settings.eps)
 

@@ -101,11 +101,10 @@ class Homeward(Nearness):
             home = _pass(one, layout.guidepaths[one.robot].length - HOME)
             if one.robot not in factory.adjusted or home not in net.passes:
                 continue
-            gear = factory.robots[one.robot].operations
-            then = factory.operations[gear[(gear.index(operation_of(one.since)) + 1) % len(gear)]]
+            then = factory.operations[factory.after(one.robot, operation_of(one.since))]
             if then.place in one.places and factory.begins(one.robot, then.index):
                 before = transitions[net.net.right[net.passes[home][0]]].name
-                start, tokens = transitions[then.start].name, int(then.index == gear[0])
+                start, tokens = transitions[then.start].name, int(then == factory.first(one.robot))
                 yield Precedence(f"order:{before}:{start}", before, start, tokens)
 
 

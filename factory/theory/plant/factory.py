@@ -214,6 +214,11 @@ class Factory(Pictured):
         """The last operation of a robot's program: what it brings is delivered there."""
         return self.operations[self.robots[robot].operations[-1]]
 
+    def after(self, robot: int, operation: int) -> OperationId:
+        """The operation (index) that comes after one in a robot's gear."""
+        gear = self.robots[robot].operations
+        return gear[(gear.index(OperationId(operation)) + 1) % len(gear)]
+
     def begins(self, robot: int, operation: int) -> bool:
         """Whether a robot (index) begins a tour with an operation (index)."""
         return any(tour[0] == operation for tour in self.tours[robot])

@@ -49,8 +49,7 @@ def before_next(layout: Layout, robot: int) -> float:
 
 def raised(layout: Layout, robot: int, after: int) -> Past:
     """When a robot's lift is up for its next tour after an operation (index)."""
-    gear = layout.factory.robots[robot].operations
-    up = layout.visits[gear[(gear.index(after) + 1) % len(gear)], robot].up
+    up = layout.visits[layout.factory.after(robot, after), robot].up
     return Past(end_of(after), layout.factory.lift_axis[robot], up - SPARE)
 
 
