@@ -19,7 +19,7 @@ from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed
-from factory.engine.simulation.simulation import Compiled, compiled
+from factory.engine.simulation.compiled import Compiled, compiled
 from factory.floor.layout.saved import LAID_FOR
 from factory.theory.nets.verify import proved
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from factory.engine.mjcf.timestep import timed
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observer, State
+from factory.engine.simulation.compiled import Compiled, compiled
 from factory.engine.simulation.distributed import DistributedSupervisor
 from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.modelling import modelled
@@ -31,7 +32,7 @@ from factory.floor.modes.modes import operation_modes, robot_limits
 from factory.floor.modes.staging import HeadStart, stages_of
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, MOST, Settings
-from factory.theory.control.mode import Limits, Mode
+from factory.theory.control.mode import Limits
 from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.replay import replay
@@ -53,20 +54,12 @@ FALL = 0.5
 SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
 
 
-@dataclass(frozen=True)
-class Compiled:
-    """What runs share that differ in seed and jitter alone: the mode of each operation and, in
-    MuJoCo, the model and the engine's model `loaded` of it, of which a run takes a copy."""
-
-    modes: tuple[Mode, ...]
-    model: Model | None = None
-    loaded: EngineModel | None = None
-
-
 class Simulation:
     """One run, ready to go: `run()` does it.
 
     Args:
+        layout: the laid-out factory.
+        request: the request for the run.
         compiled: what `compiled` made for an earlier run of the layout.
 
     Attributes:
@@ -75,7 +68,8 @@ class Simulation:
         world, supervisor: the world, and what fires the net over it.
         modes, limits: the mode of each operation, and the limits of all axes.
         timing: the delays of operations.
-        counts, before: how often each transition had fired, and how many products had left before.
+        counts: how often each transition had fired before.
+        before: number of products that had left before.
 
     Raises InputError where the engine refuses the model, or a mode starts outside its domain.
     """
@@ -169,9 +163,16 @@ class Simulation:
         if self.start != factory.net.initial_marking:
             message = "a distributed run starts where every robot waits with no part"
             raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
-        ticks = settings.step, settings.steps
-        moved = self.modes, self.limits, self.world
-        return DistributedSupervisor(factory, *moved, *ticks, self.request.seed, stages)
+        return DistributedSupervisor(
+            factory,
+            self.modes,
+            self.limits,
+            self.world,
+            settings.step,
+            settings.steps,
+            self.request.seed,
+            stages,
+        )
 
     @property
     def physical(self) -> MujocoWorld:
@@ -189,7 +190,7 @@ class Simulation:
     @property
     def engine(self) -> EngineModel | None:
         """The engine's model; None in the ideal world."""
-        return self.physical.m if self.model else None
+        return None if self.model is None else self.physical.m
 
     @property
     def at_ends(self) -> list[Observer]:
@@ -328,15 +329,3 @@ def _timed(layout: Layout, request: RunRequest, compiled: Compiled | None) -> Se
     if compiled is not None and compiled.model is not None:
         return compiled.model.settings
     return timed(request.settings, layout, request.world, request.jitter)
-
-
-def compiled(layout: Layout, request: RunRequest) -> Compiled:
-    """What runs share whose requests differ in seed and jitter alone, and that begin at the
-    beginning. Raises InputError as `Simulation` does."""
-    modes = operation_modes(layout, request.settings.eps)
-    if request.world == "ideal":
-        return Compiled(modes)
-    from factory.engine.mjcf.loading import load
-
-    model = modelled(layout, request, {})
-    return Compiled(modes, model, load(model))

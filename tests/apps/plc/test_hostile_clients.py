@@ -15,8 +15,9 @@ from factory.apps.deviations import Deviation, deviate
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.signals import NOBODY, Commands, Sensed
+from factory.engine.simulation.compiled import compiled
 from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation, compiled
+from factory.engine.simulation.simulation import Simulation
 from tests.apps.plc.test_plc import text
 from tests.examples import with_hands
 from tests.hostile_controllers import HostileController

@@ -20,9 +20,10 @@ from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
 from factory.apps.recovery.standing import MotionHold
 from factory.apps.recovery.undo import undo
 from factory.engine.record.failures import Failures
+from factory.engine.simulation.compiled import compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run, entries_of
-from factory.engine.simulation.simulation import Simulation, compiled
+from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import read
 from factory.support.errors import InputError

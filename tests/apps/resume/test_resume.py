@@ -24,8 +24,9 @@ from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.resuming import Resumed
 from factory.engine.record.state import State
 from factory.engine.record.verdict import HEADER
+from factory.engine.simulation.compiled import Compiled, compiled
 from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Compiled, Simulation, compiled
+from factory.engine.simulation.simulation import Simulation
 from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
 from factory.support.files import RECORD
