@@ -11,6 +11,9 @@ import click
 
 from factory.commands.options import DRAW, FAULTS, FLOOR, MOTION, OUTPUT, PICTURE, RELAY, RUN, WIP
 
+ADVANCED = "Advanced"
+"""The title of the section for EXPERT."""
+
 TITLES = {
     "Run": (RUN, DRAW, WIP),
     "Failures": (FAULTS,),
@@ -18,6 +21,7 @@ TITLES = {
     "Robots": (RELAY,),
     "Floor": (FLOOR,),
     "Motion and physics": (MOTION,),
+    ADVANCED: (),
     "Printing": (OUTPUT,),
 }
 """The shared options in each section of a help text."""
@@ -31,9 +35,6 @@ EXPERT = frozenset(
 )
 """The parameters that few users need: a section of their own, which `-h` leaves out."""
 
-ADVANCED = "Advanced"
-"""The title of that section."""
-
 SHORT = "-h"
 """The option that lists the common options alone."""
 
@@ -44,16 +45,15 @@ class Grouped(click.Command):
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
-        self.params.append(
-            click.Option(
-                [SHORT, "common"],
-                is_flag=True,
-                is_eager=True,
-                expose_value=False,
-                callback=_show_common,
-                help="Show the common options and exit.",
-            )
+        self.common = click.Option(
+            [SHORT, "common"],
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            callback=_show_common,
+            help="Show the common options and exit.",
         )
+        self.params.append(self.common)
 
     def get_help_option_names(self, ctx: click.Context) -> list[str]:
         """The names of the option that lists all."""
@@ -61,10 +61,8 @@ class Grouped(click.Command):
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the sections."""
-        titles = _titles()
-        helps = {self.get_help_option(ctx), *(p for p in self.params if SHORT in p.opts)}
-        sections: dict[str, list[tuple[str, str]]]
-        sections = {"Options": [], **{title: [] for title in TITLES}, ADVANCED: []}
+        titles, helps = _titles(), (self.common, self.get_help_option(ctx))
+        sections: dict[str, list[tuple[str, str]]] = {"Options": [], **{t: [] for t in TITLES}}
         for parameter in self.get_params(ctx):
             if record := parameter.get_help_record(ctx):
                 name = parameter.name
@@ -72,7 +70,6 @@ class Grouped(click.Command):
                 title = "Printing" if parameter in helps else title
                 sections[title].append(record)
         left = sections.pop(ADVANCED) if SHORT in ctx.meta else []
-        sections["Printing"] = sections.pop("Printing")
         for title, rows in sections.items():
             if rows:
                 with formatter.section(title):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import wraps
+from inspect import signature
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
@@ -73,12 +74,14 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
-def gathered(kind: type, name: str, but: str = "") -> Callable[[F], F]:
-    """A decorator that passes the options that are fields of a dataclass, `but` for one, to a
-    command as one value, by this name."""
-    names = [field.name for field in fields(kind) if field.name != but]
+def gathered(kind: type, name: str) -> Callable[[F], F]:
+    """A decorator that passes the options that are fields of a dataclass, but for those that a
+    command takes itself, to the command as one value, by this name."""
 
     def decorate(command: F) -> F:
+        taken = signature(command).parameters
+        names = [field.name for field in fields(kind) if field.name not in taken]
+
         @wraps(command)
         def call(**values: Any) -> Any:
             gathered_values = {key: values.pop(key) for key in names if key in values}

@@ -33,7 +33,7 @@ from factory.support.console import emit, say
 @click.option("--max-time", type=shared.SECONDS, help="Stop after this simulated time [s].")
 @shared.LENIENT
 @shared.STRICT
-@shared.gathered(RunOptions, "asked", but="units")
+@shared.RUNS
 @shared.FLOOR
 @shared.RELAY
 @shared.MOTION
