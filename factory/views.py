@@ -132,22 +132,18 @@ def env(
     >>> seen["position"].shape, seen["legal"].shape
     ((6,), (6, 8))
     """
-    from factory.engine.simulation.request import RunRequest
+    from factory.apps.runs.options import RunOptions
     from factory.engine.simulation.simulation import Simulation
+    from factory.support.errors import usage_error
     from factory.support.version import optional
 
     gym = optional("gymnasium", "gymnasium", "an environment", "gym")
     from factory.apps.environment.plant import FactoryEnv
 
-    project, shown = project_of(product, settings), render_mode is not None
-    request = RunRequest(
-        units=units,
-        jitter=jitter,
-        settings=project.settings,
-        catalogue=project.catalogue,
-        shown=shown,
-    )
-    first = Simulation(project.layout, request)
+    if worlds is not None and worlds < 1:
+        raise usage_error(f"{worlds} worlds", "give 1 or more, or None")
+    project, asked = project_of(product, settings), RunOptions(units=units, jitter=jitter)
+    first = Simulation(project.layout, asked.request(project, shown=render_mode is not None))
 
     def made() -> gymnasium.Env[Any, Any]:
         return FactoryEnv(first, interval, max_time, render_mode)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any
 
 import gymnasium
@@ -79,6 +80,9 @@ class FactoryEnv(gymnasium.Env[Seen, Seen]):
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise usage_error(f"render_mode {render_mode!r}", "there is 'rgb_array', or None")
+        if not (0.0 < interval < max_time < inf):
+            message = f"a step of {interval} s in an episode of at most {max_time} s"
+            raise usage_error(message, "give 0 < interval < max_time, for example 0.1 and 300")
         self.render_mode, self._max_time = render_mode, max_time
         self._glimpses: Glimpses | None = None
         self.factory, self.simulation, self._first = first.layout.factory, first, first

@@ -176,17 +176,11 @@ class PlantInterlock:
                     self.unfinished(operation) if leads else works
                 )
         for operation in factory.operations:
-            if self.marked[operation.place]:
-                takers = [robot for robot in operation.robots if robot != operation.carrier]
-            else:
-                takers = (
-                    []
-                    if jobs[operation.carrier] or self.obstacle(operation)
-                    else [operation.carrier]
-                )
-            for robot in takers:
-                if not jobs[robot] and robot not in self.grips.closed:
-                    legal[robot, operation.index + 1] = True
+            starts = not self.marked[operation.place]
+            for robot in operation.robots:
+                free = not jobs[robot] and robot not in self.grips.closed
+                if free and starts == (robot == operation.carrier):
+                    legal[robot, operation.index + 1] = not (starts and self.obstacle(operation))
         return legal
 
     def _fire(self, operation: Operation, transition: int) -> None:

@@ -124,6 +124,17 @@ def test_worlds_are_a_vector() -> None:
     assert paid.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_a_wrong_render_mode_is_named() -> None:
-    with pytest.raises(factory.InputError, match="rgb_array"):
-        env_of("paper", render_mode="human")
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ({"render_mode": "human"}, "rgb_array"),
+        ({"interval": 0.0}, "0 < interval < max_time"),
+        ({"interval": float("nan")}, "0 < interval < max_time"),
+        ({"max_time": -1.0}, "0 < interval < max_time"),
+        ({"worlds": 0}, "give 1 or more"),
+        ({"units": 0}, "units"),
+    ],
+)
+def test_what_cannot_be_is_named(how: dict[str, Any], words: str) -> None:
+    with pytest.raises(factory.InputError, match=words):
+        factory.env(ROOT / "examples" / "paper.pag", **how)
