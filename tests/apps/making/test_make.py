@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from tests.command_line import Terminal
 from tests.paths import ROOT
@@ -57,6 +59,23 @@ def test_it_stops_where_a_person_has_to_decide(run: Terminal, tmp_path: Path) ->
     found = run("make", file, "-o", tmp_path / "made", "--json")
     assert (found.status, found.json["stopped"], found.json["files"]) == (2, "check", [])
     assert found.json["steps"][0]["errors"][0]["code"] == "PagNotTree"
+
+
+def test_it_goes_on_from_the_plan_that_was_just_written(run: Terminal, tmp_path: Path) -> None:
+    """Whatever else is in the folder."""
+    folder = tmp_path / "made"
+    folder.mkdir()
+    (folder / "zzz.pag").write_text(BROKEN)
+    os.utime(folder / "zzz.pag", (0, 0))
+    cad = tmp_path / "two"
+    cad.mkdir()
+    for name, at in (("base", 0.0), ("block", 10.0)):
+        solid = trimesh.creation.box((30.0, 30.0, 10.0))
+        solid.apply_translation((0.0, 0.0, at))
+        solid.export(cad / f"{name}.stl")
+    done = run("make", cad, "-o", folder, "--unit", "mm", "--units", 1, "--json")
+    assert (done.status, done.json["stopped"]) == (0, None)
+    assert f"factory check {folder / 'two.pag'}" in {step["command"] for step in done.json["steps"]}
 
 
 def test_what_is_missing_ends_with_plan(run: Terminal, tmp_path: Path) -> None:

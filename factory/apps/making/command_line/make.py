@@ -17,9 +17,7 @@ from factory.commands.options import OUT, OUTPUT, PATH, SECONDS, UNITS
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
-
-MISSING = 3
-"""The exit status of a command that lacks something on this machine."""
+from factory.support.errors import MissingError, StoppedError
 
 MEND = {
     "plan": "decide what it asks, and give that to `factory plan SOURCE -o {folder}`; then",
@@ -76,7 +74,7 @@ def make(
     for step in _steps(source, folder, units, options):
         status, printed = _carried_out(step, out)
         done.append({"command": str(step), "status": status, **printed})
-        if status and not (step.optional and status == MISSING):
+        if status and not (step.optional and status == MissingError.exit_status):
             break
     else:
         status, step = 0, None
@@ -85,7 +83,8 @@ def make(
         stopped = step.name if step else None
         emit({"folder": str(folder), "steps": done, "stopped": stopped, "files": files})
     elif step is not None:
-        say(f"stopped at `factory {step.name}`: {_mend(step, source, folder)}")
+        what = "" if status == StoppedError.exit_status else MEND[step.name]
+        say(f"stopped at `factory {step.name}`: {_going_on(what, step, source, folder)}")
     else:
         say(f"all files are in {folder}: begin with the film and the page")
     return status
@@ -96,7 +95,7 @@ def _steps(source: Path, folder: Path, units: int, options: list[str]) -> Iterat
     pag = source
     if source.suffix != ".pag":
         yield MakeStep(("plan", str(source), "-o", str(folder), *options))
-        (pag,) = folder.glob("*.pag")
+        pag = _planned(folder) or source
     log, film, page = (folder / f"{pag.stem}{end}" for end in (".log", ".mp4", ".html"))
     yield MakeStep(("check", str(pag)))
     folder.mkdir(parents=True, exist_ok=True)
@@ -116,13 +115,17 @@ def _carried_out(step: MakeStep, out: OutputOptions) -> tuple[int, dict[str, Any
     with redirect_stdout(StringIO()) as stream:
         status = run_command([*step.words, "--json"])
     document = json.loads(stream.getvalue() or "{}")
-    return status, {key: document[key] for key in ("errors",) if key in document}
+    return status, {"errors": document["errors"]} if "errors" in document else {}
 
 
-def _mend(step: MakeStep, source: Path, folder: Path) -> str:
-    """What to do, and the command that goes on."""
-    pag = next(iter(folder.glob("*.pag")), source)
-    log, page = folder / f"{pag.stem}.log", folder / f"{pag.stem}.html"
-    again = source if step.name == "plan" else pag
-    what = MEND[step.name].format(folder=folder, pag=pag, log=log, page=page)
-    return f"{what} factory make {shlex.quote(str(again))} -o {shlex.quote(str(folder))}"
+def _planned(folder: Path) -> Path | None:
+    """The PAG in a folder that was written last."""
+    return max(folder.glob("*.pag"), key=lambda path: path.stat().st_mtime, default=None)
+
+
+def _going_on(what: str, step: MakeStep, source: Path, folder: Path) -> str:
+    """What to do where a step has stopped, and the command that goes on."""
+    pag = source if source.suffix == ".pag" or step.name == "plan" else _planned(folder) or source
+    files = {end: folder / f"{pag.stem}.{name}" for end, name in (("log", "log"), ("page", "html"))}
+    again = shlex.join(("factory", "make", str(pag), "-o", str(folder)))
+    return f"{what.format(folder=folder, pag=pag, **files)} {again}".strip()
