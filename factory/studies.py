@@ -142,8 +142,15 @@ def fidelity(
     check_values({"units": units, "jitter": jitter, "max_time": max_time, "jobs": jobs})
     project = project_of(product, settings)
     proved(project.layout.factory.net)
-    runs = range(seeds), units, jitter, project.settings, jobs or cores(), None, max_time
-    return measure(project.layout, *runs)
+    return measure(
+        project.layout,
+        range(seeds),
+        units,
+        jitter,
+        project.settings,
+        jobs or cores(),
+        max_time=max_time,
+    )
 
 
 def pareto(

@@ -75,8 +75,17 @@ def fidelity(
             bar.show("running", finished, seeds)
 
         jobs = jobs or cores()
-        asked = range(seeds), units, jitter, settings, jobs
-        measured = measure(layout, *asked, done, max_time, on)
+        measured = measure(
+            layout,
+            range(seeds),
+            units,
+            jitter,
+            settings,
+            jobs,
+            done=done,
+            max_time=max_time,
+            on=on,
+        )
     document = measured.as_json()
     if output is not None:
         write_text(output, json.dumps(finite(document), indent=1) + "\n")
