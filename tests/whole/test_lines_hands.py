@@ -339,10 +339,14 @@ def test_a_hand_over_2_mm_off_fails_certificate_and_run(monkeypatch: pytest.Monk
     assert "HandOffGap" in {failure.code for failure in run.verdict.failures}
 
 
-def test_the_sliders_of_a_magazine_turn_round_as_predicted(tmp_path: Path) -> None:
-    """Where each part waits for the slider of the one before, a run takes the time of its critical
-    circuit: the next part begins to come down in the tick in which the last slider is up."""
+@pytest.mark.parametrize(("seed", "units"), [(50, 4), (291152039, 10), (291152024, 5)])
+def test_a_magazine_and_its_robot_are_as_fast_as_predicted(
+    seed: int, units: int, tmp_path: Path
+) -> None:
+    """The next part begins to come down in the tick in which the last slider is up (50), and in
+    that in which the robot is out of its way (291152039); and a lift rises no further than its next
+    tour takes it (291152024): a run takes the time of its critical circuit."""
     file = tmp_path / "product.pag"
-    file.write_text(random_product(50))
-    run = factory.run(factory.compile(file, robots="least"), units=4)
+    file.write_text(random_product(seed))
+    run = factory.run(factory.compile(file, robots="least"), units=units)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, abs=1e-6)
