@@ -59,7 +59,7 @@ def test_nothing_is_asked_while_nothing_changes(
         changed.extend([what] * change)
         return change
 
-    monkeypatch.setattr(Feeders, "tend", lambda self: told("part", tend(self)))
+    monkeypatch.setattr(Feeders, "tend", lambda *given: told("part", tend(*given)))
     simulation = Simulation(layout_of(name), RunRequest(units=6, **given))
     supervisor, world = simulation.supervisor, simulation.world
     asked, ticks = set(), 0
