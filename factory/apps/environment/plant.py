@@ -1,4 +1,4 @@
-"""The environment: what an agent sees of a plant, what it may command, and what it is paid."""
+"""The environment: observations, actions and rewards of an agent that drives a plant."""
 
 from __future__ import annotations
 
@@ -26,11 +26,12 @@ FASTEST = 100.0
 SEEDS = 2**31
 """A run's seed is drawn below this."""
 
-Seen = dict[str, Any]
-"""An observation or an action: an array for each name of its space."""
+EnvObservation = dict[str, Any]
+EnvAction = dict[str, Any]
+"""An array for each name of its space."""
 
 
-class FactoryEnv(gymnasium.Env[Seen, Seen]):
+class FactoryEnv(gymnasium.Env[EnvObservation, EnvAction]):
     """A factory over MuJoCo whose plant an agent commands as a PLC does; one episode makes `units`
     products.
 
@@ -113,8 +114,8 @@ class FactoryEnv(gymnasium.Env[Seen, Seen]):
         )
 
     def reset(
-        self, *, seed: int | None = None, options: Seen | None = None
-    ) -> tuple[Seen, dict[str, Any]]:
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[EnvObservation, dict[str, Any]]:
         """Begin an episode: the factory is empty, all robots are at home. `options` has no meaning
         yet."""
         super().reset(seed=seed)
@@ -127,7 +128,7 @@ class FactoryEnv(gymnasium.Env[Seen, Seen]):
         self._told = 0
         return self._seen(), self._info()
 
-    def step(self, action: Seen) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+    def step(self, action: EnvAction) -> tuple[EnvObservation, float, bool, bool, dict[str, Any]]:
         """Command the plant, and let a step's time pass."""
         world = self.simulation.world
         before = world.delivered()
@@ -157,7 +158,7 @@ class FactoryEnv(gymnasium.Env[Seen, Seen]):
             self._glimpses.close()
             self._glimpses = None
 
-    def _seen(self) -> Seen:
+    def _seen(self) -> EnvObservation:
         interlock = self._driven.interlock
         sensed = self._driven.sensed()
         low, high = self._driven.corridor()

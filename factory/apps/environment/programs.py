@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.api import NOPART, Array, Operation
-from factory.apps.environment.plant import FactoryEnv, Seen
+from factory.apps.environment.plant import EnvAction, EnvObservation, FactoryEnv
 
 NEAR = 2e-4
 """An axis is at its goal within this [m]."""
@@ -28,7 +28,7 @@ class Programs:
         self._since = [np.inf] * len(env.factory.operations)
         self._setpoint: Array | None = None
 
-    def act(self, seen: Seen, time: float) -> Seen:
+    def act(self, seen: EnvObservation, time: float) -> EnvAction:
         """The action for an observation at a time [s]."""
         if self._setpoint is None:
             self._setpoint = seen["position"].copy()
@@ -43,13 +43,13 @@ class Programs:
             "job": np.array(jobs, np.int64),
         }
 
-    def _there(self, operation: Operation, seen: Seen) -> bool:
+    def _there(self, operation: Operation, seen: EnvObservation) -> bool:
         """Whether all axes of an operation stand at their goals."""
         axes = [*self._factory.axes[operation.index]]
         off = np.abs(seen["position"][axes] - self._goals[operation.index])
         return bool((off < NEAR).all() and (np.abs(seen["speed"][axes]) < SLOW).all())
 
-    def _job(self, robot: int, seen: Seen, time: float, setpoint: Array) -> int:
+    def _job(self, robot: int, seen: EnvObservation, time: float, setpoint: Array) -> int:
         """The job of a robot now; its setpoints and its grip are set."""
         numbers = self._factory.robots[robot].operations
         operation = self._factory.operations[numbers[self._done[robot] % len(numbers)]]
