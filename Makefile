@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-core test-all oracles bench fidelity faults compare docs gallery lint golden wheel setup clean
+.PHONY: help demo test test-core test-all oracles bench fidelity faults compare docs gallery figures lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
@@ -15,6 +15,7 @@ help:
 	@echo "make compare   beside what others publish, written to docs/comparison.md"
 	@echo "make docs      the documentation site, in docs/_build/html"
 	@echo "make gallery   render the stills of the gallery anew"
+	@echo "make figures   draw the figures of the theory pages anew"
 	@echo "make lint      ruff and mypy"
 	@echo "make golden    renew the golden texts (review the diff)"
 	@echo "make wheel     build the wheel in dist/"
@@ -60,10 +61,13 @@ docs:
 gallery: setup
 	$(PY) tools/gallery $(ARGS)
 
+figures: setup
+	$(PY) -m tools.figures $(ARGS)
+
 lint:
 	@tools/setup dev
-	$(PY) -m ruff check factory tests benches docs tools/gallery
-	$(PY) -m ruff format --check factory tests benches docs tools/gallery
+	$(PY) -m ruff check factory tests benches docs tools/gallery tools/figures
+	$(PY) -m ruff format --check factory tests benches docs tools/gallery tools/figures
 	$(PY) -m mypy
 
 golden: setup
