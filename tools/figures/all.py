@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from functools import cache
 from math import radians
+from pathlib import Path
 
 import factory
 from factory.api import Factory, Layout
@@ -15,11 +16,13 @@ from tools.figures.floors import draw_gluing, draw_stretching, draw_way
 from tools.figures.nets import draw_exclusion, draw_net
 from tools.figures.rings import GearPicture, draw_tooth
 
+PAPER = Path(__file__).resolve().parents[2] / "examples" / "paper.pag"
+
 
 @cache
 def layout() -> Layout:
     """The paper's example, laid out."""
-    return factory.lay_out("examples/paper.pag")
+    return factory.lay_out(PAPER)
 
 
 @cache
@@ -30,7 +33,7 @@ def compiled() -> Factory:
 
 def tree() -> str:
     """The paper's example as `factory export --format svg --of tree` draws it."""
-    return factory.export("examples/paper.pag", "svg", of="tree")
+    return factory.export(PAPER, "svg", of="tree")
 
 
 FIGURES: Mapping[str, Callable[[], str]] = {
@@ -43,7 +46,7 @@ FIGURES: Mapping[str, Callable[[], str]] = {
     "gluing": draw_gluing,
     "stretching": lambda: draw_stretching(layout()),
     "spaces": draw_spaces,
-    "train": lambda: draw_net(factory.compile("examples/paper.pag", robots=3), (2, 0, 1)),
+    "train": lambda: draw_net(factory.compile(PAPER, robots=3), (2, 0, 1)),
     "corner": draw_corner,
     "tee": draw_tee,
     "counts": lambda: draw_counts(compiled()),

@@ -129,20 +129,20 @@ def _cell(
 
 
 def draw_counts(factory: Factory) -> str:
-    """How often each transition has fired, before and after sub2_e is undone."""
+    """How often each transition has fired, before and after one is undone."""
     net = marked(factory.net)
     counts, tokens = [0] * len(net.net.transitions), list(net.tokens)
-    asked = next(e for e, t in enumerate(net.net.transitions) if t.name == ASKED)
-    while counts[asked] < TIMES:
+    number = {t.name: event for event, t in enumerate(net.net.transitions)}
+    while counts[number[UNTIL]] < TIMES:
         for event in list(net.enabled(tokens)):
             counts[event] += 1
             net.fire(tokens, event)
-    after = undo(factory.net, counts, [asked], factory.joins)
+    after = undo(factory.net, counts, [number[ASKED]], factory.joins)
     return _bars(factory, counts, list(after))
 
 
-ASKED, TIMES = "sub2_e", 2
-"""What is undone as soon as it has fired so often, where all that is enabled fires at once."""
+UNTIL, TIMES, ASKED = "sub3_s", 2, "sub2_e"
+"""All that is enabled fires at once, until a transition has fired so often; then one is undone."""
 
 
 def _bars(factory: Factory, before: list[int], after: list[int]) -> str:
