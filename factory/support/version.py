@@ -24,6 +24,7 @@ EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
         "yaml": (("pyyaml",), "`import` of trees in YAML"),
         "cluster": (("distributed",), "many runs on a Dask cluster (`--on`)"),
         "step": (("cascadio",), "`plan` of STEP files"),
+        "pandas": (("pandas",), "tables as data frames (`to_frame`)"),
     }
 )
 """Each extra: its packages, and what it is for."""

@@ -32,7 +32,7 @@ def document(analysis: Analysis) -> dict[str, Any]:
                 timing.factory.operations, net.seconds, analysis.slack, strict=False
             )
         ],
-        "robots": _robots(analysis),
+        "robots": analysis.records(),
         "least_wip": analysis.least_wip,
         "scenarios": [
             {
@@ -60,28 +60,6 @@ def _circuits(analysis: Analysis) -> list[dict[str, Any]]:
             "places": [places[p].name for p in circuit.places],
         }
         for circuit in analysis.net.circuits
-    ]
-
-
-def _robots(analysis: Analysis) -> list[dict[str, Any]]:
-    robots = analysis.timing.factory.robots
-    return [
-        {
-            "robot": robot.name,
-            "type": robot.type,
-            "moving_s": share.moving,
-            "working_s": share.working,
-            "standing_s": share.standing,
-            "waiting_s": share.waiting,
-            "busy": share.busy,
-            "slack_s": gain.slack,
-            "gain_10_percent_faster_s": gain.faster,
-            "gain_10_percent_shorter_s": gain.shorter,
-            "gain_second_robot_s": gain.copy,
-        }
-        for robot, share, gain in zip(
-            robots, analysis.flow.shares, analysis.sensitivities, strict=True
-        )
     ]
 
 

@@ -1,9 +1,33 @@
-"""Tables as HTML, on pages and in notebooks."""
+"""Tables as HTML, on pages and in notebooks, and as data frames."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from typing import TYPE_CHECKING
+
+from factory.api import optional
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+class Tabular(ABC):
+    """A value that is a table, and gives it as a data frame."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def records(self) -> Sequence[Mapping[str, object]]:
+        """The rows of the table: figures by their names in `--json`."""
+
+    def to_frame(self) -> DataFrame:
+        """The table as a data frame of pandas: a row for each of `records`, a column for each of
+        their names, with its unit; NaN for a figure that is None. Raises MissingError without
+        pandas."""
+        pandas = optional("pandas", "pandas", "a data frame", "pandas")
+        return pandas.DataFrame.from_records([dict(record) for record in self.records()])
 
 
 def table(columns: Sequence[str], rows: str) -> str:

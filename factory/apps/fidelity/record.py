@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Any
 
 from factory.api import Diagnostic
+from factory.apps.drawing.tables import Tabular
 from factory.engine.record.verdict import MOST
 
 
@@ -194,7 +195,7 @@ class SeedRecord:
 
 
 @dataclass(frozen=True)
-class Fidelity:
+class Fidelity(Tabular):
     """A product's comparison over seeds."""
 
     product: str
@@ -217,6 +218,13 @@ class Fidelity:
         """Seeds and products in words: `50 seeds, 4 units` or `4 to 61 units`."""
         least, most = min(record.units for record in self.seeds), self.units
         return f"{len(self.seeds)} seeds, {least if least == most else f'{least} to {most}'} units"
+
+    def records(self) -> list[dict[str, object]]:
+        """A row for each seed, with its figures."""
+        return [
+            {"seed": one.seed, "units": one.units, "passed": one.passed, **one.figures}
+            for one in self.seeds
+        ]
 
     def values(self, key: str) -> list[float]:
         """A figure over the seeds that have it."""

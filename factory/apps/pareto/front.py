@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from factory.api import Observer, Project, RunRequest, Simulation, Timing, steady_from, write_pag
 from factory.apps.analyze.timed import steady_units
-from factory.apps.drawing.tables import titled
+from factory.apps.drawing.tables import Tabular, titled
 from factory.apps.few_robots.aim import Least
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate
@@ -242,7 +242,7 @@ def undominated(points: Iterable[FrontPoint]) -> list[FrontPoint]:
 
 
 @dataclass(frozen=True)
-class ParetoFront:
+class ParetoFront(Tabular):
     """The Pareto front found for a product: `points` in the order of their robots; the `least`
     number of robots that can make it; the numbers of factories `estimated` and `laid_out`; the
     product as `written` as a point, None where it has no layout; how the sweep `ended`."""
@@ -266,6 +266,11 @@ class ParetoFront:
         )
         columns = ("robots", "tools", "cycle [s]", "floor [m²]", "measured, with jitter [s]")
         return titled(repr(self), columns, rows)
+
+    def records(self) -> list[dict[str, object]]:
+        """A row for each point, with the figures of `pareto --json`."""
+        rows = (point.as_json().items() for point in self.points)
+        return [{k: v for k, v in row if not isinstance(v, list | dict)} for row in rows]
 
     @property
     def ending(self) -> str:

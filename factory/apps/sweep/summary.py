@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.special import stdtrit
 
-from factory.apps.drawing.tables import titled
+from factory.apps.drawing.tables import Tabular, titled
 from factory.apps.sweep.grid import Value
 from factory.apps.sweep.store import reading
 from factory.apps.sweep.work import FAILING_FIGURES, FIGURES
@@ -82,6 +82,14 @@ class Group:
         cycle = self.figures.get(FIRST[0])
         return (cycle.mean, cycle.deviation) if cycle else (None, None)
 
+    def record(self) -> dict[str, object]:
+        """The group as a row of a table."""
+        row: dict[str, object] = {**dict(self.values), "done": self.done, "failed": self.failed}
+        for key, one in self.figures.items():
+            row |= {key: one.mean, f"{key}_deviation": one.deviation}
+            row |= {f"{key}_low": one.confidence_low, f"{key}_high": one.confidence_high}
+        return row
+
     def as_json(self) -> dict[str, Any]:
         """Under the keys of `sweep --summary --json`."""
         figures = {key: asdict(statistic) for key, statistic in self.figures.items()}
@@ -91,7 +99,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class Summary(Tabular):
     """The groups of a sweep, in the order of their values; `reasons`: why runs failed, with the
     number of each."""
 
@@ -114,6 +122,12 @@ class Summary:
         )
         figures = ("done", "failed", "cycle time [s]", "deviation [s]")
         return titled(repr(self), (*names, *figures), rows)
+
+    def records(self) -> list[dict[str, object]]:
+        """A row for each group: what varies, the numbers of runs done and failed, and the mean of
+        each figure with its `_deviation` and the 95 % confidence interval, from `_low` to
+        `_high`."""
+        return [group.record() for group in self.groups]
 
     @property
     def done(self) -> int:
