@@ -136,6 +136,7 @@ def test_the_tutorial_shows_what_is_printed(
         *("index.md", "ten-minutes.md"),
         *("guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
         *("guide/revise.md", "theory/exercises.md", "theory/lecture.md"),
+        *("theory/mixes.md", "theory/tees.md"),
     ],
 )
 def test_the_way_in_shows_what_is_printed(
