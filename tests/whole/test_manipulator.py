@@ -14,7 +14,6 @@ from factory.apps.exports.ways import ways
 from factory.apps.few_robots.folding import folded
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
-from factory.engine.mjcf.names import turn
 from factory.engine.record.state import State
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
@@ -256,7 +255,7 @@ def test_the_tool_holds_the_peg_as_it_turns(cell: Layout) -> None:
     """While it is in the tool its angle is that of the joint."""
     simulation = Simulation(cell, RunRequest(units=1))
     world, seen = simulation.world, list[float]()
-    joint = world.m.joint(turn("r2"))
+    joint = world.m.joint("r2/turn")
     address = int(world.m.joint("part/peg#1").qposadr[0])
     grip = world.m.equality("grip/r2/peg").id
 

@@ -177,8 +177,9 @@ def driven(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
     What hangs from a drive weighs on it; what a guide bears rubs there.
     """
     motion = axis.motion
-    own = axis.mass * (GYRATION if motion.rotary else 1.0) + axis.armature
-    own = round(own, 9) if motion.rotary else own
+    empty = axis.mass + axis.armature
+    if motion.rotary:
+        empty = round(GYRATION * axis.mass + axis.armature, 9)
     a, held = settings.acceleration / motion.lever, 2 * axis.friction
     if motion.rolls:
         held = 2 * (axis.friction + ROLLING * load * GRAVITY)
@@ -186,7 +187,7 @@ def driven(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
         held = 2 * axis.friction + SLACK * (axis.mass + load) * GRAVITY
     push = a + GRAVITY if motion.hangs else a
     stiffness = STIFFNESS if motion.rolls else HOIST_STIFFNESS
-    return DrivenAxis(own, load, a, push, stiffness, held=held, motor=axis)
+    return DrivenAxis(empty, load, a, push, stiffness, held=held, motor=axis)
 
 
 def driven_axes(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import AxisId
-from factory.theory.problem.robot_bodies import Motion, RobotAxis
+from factory.theory.problem.robot_bodies import JointMotion, RobotAxis
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class Axis:
     joint: RobotAxis
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> JointMotion:
         """How it moves."""
         return self.joint.motion
 

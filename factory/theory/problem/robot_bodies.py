@@ -30,7 +30,7 @@ SLIDE, LIFT_JOINT, TURN_JOINT = "slide", "lift", "turn"
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class JointMotion:
     """How a joint moves a robot and what it carries.
 
     Attributes:
@@ -55,9 +55,9 @@ class Motion:
 
 
 MOTIONS = {
-    SLIDE: Motion("along", "carriage", (-1.0, 0.0, 0.0), "drive", rolls=True),
-    LIFT_JOINT: Motion("up", "head", (0.0, 0.0, 1.0), "hoist", hangs=True),
-    TURN_JOINT: Motion("turn", "tool", (0.0, 0.0, 1.0), "drive", rotary=True, lever=0.1),
+    SLIDE: JointMotion("along", "carriage", (-1.0, 0.0, 0.0), "drive", rolls=True),
+    LIFT_JOINT: JointMotion("up", "head", (0.0, 0.0, 1.0), "hoist", hangs=True),
+    TURN_JOINT: JointMotion("turn", "tool", (0.0, 0.0, 1.0), "drive", rotary=True, lever=0.1),
 }
 """How a robot moves by each joint, from the carriage up. At the end of an arm of 0.1 m, what turns
 is as fast as other robots are."""
@@ -87,7 +87,7 @@ class RobotAxis:
     position: Position | None = field(default=None, compare=False, repr=False)
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> JointMotion:
         """How it moves."""
         return MOTIONS[self.joint]
 
