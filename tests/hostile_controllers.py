@@ -22,7 +22,7 @@ class HostileController:
 
     def __init__(self, layout: Layout, seed: int, program: Controller | None = None) -> None:
         self._draw, self._program = Random(seed), program
-        strokes = [layout.strokes[robot] for robot in layout.factory.strokes]
+        strokes = [high for _, high in layout.spans[len(layout.guidepaths) :]]
         self._ways = [*(path.length for path in layout.guidepaths), *strokes]
         self._jobs = len(layout.factory.operations)
         self._robots = len(layout.factory.robots)

@@ -63,7 +63,7 @@ class Claim:
     axes the spans [m], of which those of a robot and its lift go together."""
 
     def __init__(self, plan: Layout, number: int, axes: Index) -> None:
-        operation, lifts = plan.factory.operations[number], plan.factory.lift_axis
+        operation, up = plan.factory.operations[number], plan.factory.up
         net = coordinated(plan)
         # A magazine shows the part only once its robot has passed out of the slider's way.
         served = number in net.served
@@ -74,7 +74,9 @@ class Claim:
             here = operation.place in presence.places and before.isdisjoint(presence.places)
             if here and not presence.bears:
                 spans.setdefault(presence.robot, []).extend(presence.sweeps)
-        self.columns = [(column[r], column.get(lifts.get(r, -1))) for r in operation.robots]
+        self.columns = [
+            (column[r], None if (a := up(r)) is None else column.get(a)) for r in operation.robots
+        ]
         self.spans = [spans[r] for r in operation.robots]
 
     def draw(self, chance: np.random.Generator, size: int, at_ends: bool) -> Array:

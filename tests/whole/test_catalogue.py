@@ -79,7 +79,7 @@ def test_robot_types_load(name: str) -> None:
     assert robot.summary
     m = mujoco.MjModel.from_xml_path(str(robot.mjcf))
     first, kind = "slide", mujoco.mjtJoint.mjJNT_SLIDE
-    if robot.fixed:
+    if not robot.travels:
         first, kind = "turn", mujoco.mjtJoint.mjJNT_HINGE
     assert m.joint(first).type == kind
     assert m.actuator("drive").trnid[0] == m.joint(first).id

@@ -226,9 +226,10 @@ def test_lifts_carry_their_loads() -> None:
     """Those whose robots have been given something; no carriage carries a weight."""
     simulation = ready("fence")
     motion = simulation.physical.motion
-    robots = [*motion.axes.lift][:2]
-    bare = next(r for r in range(9) if r not in motion.axes.lift)
-    axes, drives = np.array([motion.axes.lift[robot] for robot in robots]), motion.drives
+    lifts = {robot: mine[1] for robot, mine in enumerate(motion.axes.of_robot) if mine[1:]}
+    robots = [*lifts][:2]
+    bare = next(r for r in range(9) if r not in lifts)
+    axes, drives = np.array([lifts[robot] for robot in robots]), motion.drives
     motion.load([*robots, bare], [1.0, 2.0, 3.0])
     assert drives.weight[axes] == pytest.approx([(HEAD + kg) * GRAVITY for kg in (1.0, 2.0)])
     assert drives.mass[axes] - drives.own[axes] == pytest.approx([1.0, 2.0])
@@ -245,7 +246,7 @@ def test_loads_of_robots_are_what_they_hold() -> None:
         supervisor.step()
         for robot in range(len(simulation.layout.factory.robots)):
             held = sum(mass[label] for label in world.parts.holdings.hand(robot))
-            for axis in motion.axes.of_robot(robot):
+            for axis in motion.axes.of_robot[robot]:
                 load = motion.drives.mass[axis] - motion.drives.own[axis]
                 assert load == pytest.approx(held, abs=1e-9)
 
@@ -254,7 +255,7 @@ def sagging() -> float:
     """How far a lift that has stood for 0.2 s hangs below its reference [m], at most."""
     simulation = ready("fence")
     world, lowest = simulation.physical, 0.0
-    lifts = np.array([*world.motion.axes.lift.values()])
+    lifts = np.array([mine[1] for mine in world.motion.axes.of_robot if mine[1:]])
     stood = np.zeros(len(lifts))
     while world.time < 4.0:
         simulation.supervisor.step()

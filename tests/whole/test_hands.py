@@ -163,7 +163,7 @@ def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
     waited = {order.past.axis for order in orders if order.past is not None}
     assert waited
     for axis in waited:
-        assert axis < len(layout.guidepaths) + len(layout.strokes)
+        assert axis < len(layout.factory.axes)
 
 
 def test_hands_of_carriers_depend_on_their_heading_alone() -> None:

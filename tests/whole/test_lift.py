@@ -51,9 +51,14 @@ ball = atomic(sphere = 0.012, pos = (0, 0, 0.0329))"""
 """A ball in a box in a box: a lift that serves a lift."""
 
 
+def lifted(factory: Factory) -> list[int]:
+    """The robots (index) that go up and down."""
+    return [axis.robot.index for axis in factory.axes[len(factory.robots) :]]
+
+
 def lifts(factory: Factory) -> dict[str, str]:
     """What each robot with a lift lowers."""
-    return {factory.robots[r].name: factory.deliveries(r)[0] for r in factory.strokes}
+    return {factory.robots[r].name: factory.deliveries(r)[0] for r in lifted(factory)}
 
 
 @pytest.mark.parametrize(
@@ -84,7 +89,7 @@ def test_a_lift_goes_as_far_as_the_farthest_of_its_tours_asks_for(
         replace(lowered, approach=replace(lowered.approach, stroke=stroke)) for stroke in strokes
     )
     robot = lowered.robots[lowered.lowered]
-    assert replace(made, operations=tours).strokes[robot] == 0.2
+    assert replace(made, operations=tours).lowering(robot) == 0.2
 
 
 @pytest.mark.parametrize("text", [FENCE, NESTED], ids=["fence", "nested"])
@@ -118,9 +123,9 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
     up = [layout.visits[robot.operations[0], robot.index].elevation for robot in factory.robots]
     inside, ball = robot["inside"], factory.by_label["ball"].carrier
     assert up[robot["n"]] == 0.0
-    assert up[inside] == factory.strokes[inside] > 0
+    assert up[inside] == factory.lowering(inside) > 0
     assert up[robot["f2"]] == up[inside]
-    assert up[ball] == up[inside] + factory.strokes[ball]
+    assert up[ball] == up[inside] + factory.lowering(ball)
     assert feeder_of(layout, "f2").low == pytest.approx(
         feeder_of(layout, "f1").low + up[inside] + 0.0105, abs=1e-9
     )
@@ -129,15 +134,16 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
 def test_a_lift_is_up_but_for_what_it_delivers_to() -> None:
     layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
-    (robot, stroke), *_ = factory.strokes.items()
+    robot, *_ = lifted(factory)
+    stroke = factory.lowering(robot)
     axis = len(factory.robots)
     modes, starts = operation_modes(layout, 2e-4), operation_starts(layout)
     first, last = (factory.robots[robot].operations[i] for i in (0, -1))
     for number, start, goal in ((first, 0.0, stroke), (last, stroke, 0.0)):
-        slot = factory.axes[number].index(axis)
+        slot = factory.moves[number].index(axis)
         assert (starts[number][slot], modes[number].goals[slot]) == (start, goal)
     lowering = modes[last]
-    slot = factory.axes[last].index(axis)
+    slot = factory.moves[last].index(axis)
     own = factory.operations[last].robots.index(robot)
     assert lowering.gate[slot] == own, "it is lowered when its own robot stands"
     assert lowering.gate[own] >= 0, "which stands after the others"
@@ -148,7 +154,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
     while any other moves, the parts keep the margin."""
     layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
-    robot = next(iter(factory.strokes))
+    robot, *_ = lifted(factory)
     last = factory.last(robot)
     simulation = Simulation(layout, RunRequest(units=1))
     goals = np.array(layout.goals(last.index)[: len(last.robots)])
@@ -158,7 +164,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
         if last.index in simulation.supervisor.active.operations:
             x = simulation.world.sense()[0]
             away = np.abs(x[list(last.robots)] - goals).max()
-            if x[len(factory.robots)] < factory.strokes[robot] - 1e-3:
+            if x[len(factory.robots)] < factory.lowering(robot) - 1e-3:
                 seen.append(away)
 
     simulation.run([observe])

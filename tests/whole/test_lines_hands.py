@@ -151,7 +151,7 @@ def test_one_hand_holds_all_labels_of_a_line(name: str, kind: str, lift: float |
     layout = project(name).layout
     robot, hand = of_line(layout)
     assert hand.kind == kind
-    assert layout.strokes.get(robot) == (None if lift is None else pytest.approx(lift))
+    assert layout.rise(robot) == (0.0 if lift is None else pytest.approx(lift))
     assert certify(layout).holds
     factory, product = layout.factory, layout.product
     pad = next(limb for limb in limbs(layout, robot) if limb.name == "pad")

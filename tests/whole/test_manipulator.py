@@ -14,7 +14,6 @@ from factory.apps.exports.ways import ways
 from factory.apps.few_robots.folding import folded
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
-from factory.engine.mjcf.names import turn
 from factory.engine.record.state import State
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
@@ -65,7 +64,7 @@ def written(folder: Path, text: str) -> Path:
 def test_what_is_placed_is_picked_first(cell: Layout) -> None:
     made = {o.label: o.template.name for o in cell.factory.making}
     assert made == {"cell": "place", "base": "atomic", "peg/pick": "pick", "peg": "atomic"}
-    assert [robot.fixed for robot in cell.factory.robots] == [False, True, False]
+    assert [not robot.travels for robot in cell.factory.robots] == [False, True, False]
 
 
 def test_a_pick_that_is_written_is_not_put_in(tmp_path: Path) -> None:
@@ -113,7 +112,7 @@ def test_a_mix_shares_its_manipulators(tmp_path: Path) -> None:
     layout = read(written(tmp_path, text)).layout
     made = layout.factory
     assert [robot.type for robot in made.robots].count("manipulator") == 2
-    assert [robot.fixed for robot in made.robots] == [r.type == "manipulator" for r in made.robots]
+    assert [r.travels for r in made.robots] == [r.type != "manipulator" for r in made.robots]
     guests = [stop.guests for stop in stops_of(made, 0)[0] if stop.joins]
     assert sorted(map(len, guests)) == [2, 2]
     assert len({robot for pair in guests for robot in pair}) == 4
@@ -123,8 +122,8 @@ def test_a_mix_shares_its_manipulators(tmp_path: Path) -> None:
 def test_a_fold_keeps_robots_fixed(tmp_path: Path) -> None:
     made = read(written(tmp_path, TWO)).factory
     again = folded(made, [], load_catalogue())
-    assert [r.fixed for r in again.robots] == [r.fixed for r in made.robots]
-    assert sum(r.fixed for r in again.robots) == 2
+    assert [not r.travels for r in again.robots] == [not r.travels for r in made.robots]
+    assert sum(not r.travels for r in again.robots) == 2
 
 
 def test_a_manipulator_goes_no_way_that_can_be_relayed(cell: Layout) -> None:
@@ -220,7 +219,7 @@ def test_the_peg_is_placed(seed: int, fed: float, tmp_path: Path) -> None:
 
 def test_two_manipulators_serve_one_robot(tmp_path: Path) -> None:
     layout = read(written(tmp_path, TWO)).layout
-    assert [path.turn for path in layout.guidepaths if path.fixed] == [-0.8, 0.4]
+    assert [path.turn for path in layout.guidepaths if not path.travels] == [-0.8, 0.4]
     run = Simulation(layout, RunRequest(units=6)).run()
     assert_good(run)
     assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.02)
@@ -256,7 +255,7 @@ def test_the_tool_holds_the_peg_as_it_turns(cell: Layout) -> None:
     """While it is in the tool its angle is that of the joint."""
     simulation = Simulation(cell, RunRequest(units=1))
     world, seen = simulation.world, list[float]()
-    joint = world.m.joint(turn("r2"))
+    joint = world.m.joint("r2/turn")
     address = int(world.m.joint("part/peg#1").qposadr[0])
     grip = world.m.equality("grip/r2/peg").id
 

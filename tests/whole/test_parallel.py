@@ -353,7 +353,9 @@ def hands_of(name: str, *branches: tuple[str, int]) -> dict[tuple[object, ...], 
         for u, t in hands.holding.frames(tours[0]):
             hand = hands.hand(robot, u, t)
             same = replace(hand, covered=hand.covered[:1]) if hand else None
-            found.setdefault((first, factory.strokes.get(robot), u, t), []).append(same)
+            found.setdefault(
+                (first, factory.up(robot) and factory.lowering(robot), u, t), []
+            ).append(same)
     return found
 
 

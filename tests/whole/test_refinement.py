@@ -122,9 +122,9 @@ class CoordinatedGame:
 
     def locate(self, x: np.ndarray) -> None:
         """Look for each robot in its presences whose places are marked."""
-        lifts = self.layout.factory.lift_axis
         for robot, here in self.robots.items():
-            at = float(x[robot]), float(x[lifts[robot]]) if robot in lifts else 0.0
+            up = self.layout.factory.up(robot)
+            at = float(x[robot]), 0.0 if up is None else float(x[up])
             marked = (p for p in here if all(self.tokens[place] > 0 for place in p.places))
             sweeps = (spans for presence in marked for spans in presence.sweeps)
             if not any(all(map(_within, at, spans)) for spans in sweeps):

@@ -305,7 +305,7 @@ def test_what_has_come_there_costs_nothing_more(paper: Layout) -> None:
         made.supervisor.step()
         active = made.supervisor.active
         seen.append({numbers[n - count] for n in active.ahead})
-        slots = sum(len(paper.factory.axes[o]) for o in active.operations) + len(active.ahead)
+        slots = sum(len(paper.factory.moves[o]) for o in active.operations) + len(active.ahead)
         assert len(active.axes) == slots == len(set(active.axes.tolist()))
     assert {0} in seen or {0, 2} in seen or {2} in seen
     assert set() in seen

@@ -155,7 +155,7 @@ def test_robots_with_lifts_go_where_told() -> None:
 def test_setpoints_are_in_the_order_of_robots() -> None:
     m, factory = stock("stool"), layout("stool").factory
     drives = [names.drive(robot.name) for robot in factory.robots]
-    hoists = [names.hoist(factory.robots[robot].name) for robot in factory.lift_axis]
+    hoists = [names.actuator(axis) for axis in factory.axes[len(factory.robots) :]]
     assert hoists and [m.actuator(n).name for n in range(m.nu)][: len(drives) + len(hoists)] == [
         *drives,
         *hoists,

@@ -209,7 +209,7 @@ def test_the_urdf_has_them() -> None:
     from factory.engine.mjcf.loading import load
 
     m = load(physical_model(layout_of("fence"), 1))
-    root = ElementTree.fromstring(_Writer(m, 0.5, "meshes").text("fence"))
+    root = ElementTree.fromstring(_Writer(m, 0.5, {}, "meshes").text("fence"))
     found = {
         joint.get("name"): [float(limit.get(key, "nan")) for key in ("lower", "upper")]
         for joint in root.iter("joint")

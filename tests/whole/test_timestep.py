@@ -234,7 +234,8 @@ def test_it_is_the_longest_that_is_good(
 def test_products_keep_half_their_limits(name: str, seed: int) -> None:
     simulation = Simulation(layout(name), RunRequest(units=2, seed=seed, jitter=0.3))
     found = measured(simulation)
-    lifts = bool(layout(name).strokes)
+    made = layout(name).factory
+    lifts = len(made.axes) > len(made.robots)
     assert simulation.request.settings.timestep == (TICK / 2 if lifts else TICK)
     error = 1e3 * predicted_error(simulation.request.settings, layout(name), 0.3)
     assert max(found.values()) < error < 1e3 * ALLOWED

@@ -220,8 +220,9 @@ def test_a_slowed_robot_knows_its_limit(factor: float) -> None:
     """And its lift's; the others go as fast as ever, and 1 gives it back."""
     simulation = ready("fence")
     hands, full = Interventions(simulation), simulation.limits.speed.copy()
-    robot = next(iter(simulation.physical.motion.axes.lift))
-    mine = simulation.physical.motion.axes.of_robot(robot)
+    axes = simulation.physical.motion.axes.of_robot
+    robot = next(r for r, mine in enumerate(axes) if mine[1:])
+    mine = [*axes[robot]]
     hands.slow(robot, factor)
     speed = simulation.limits.speed
     assert speed[mine] == pytest.approx(factor * full[mine])

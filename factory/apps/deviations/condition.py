@@ -212,7 +212,7 @@ class PlantCondition:
         axes = self.world.motion.axes
         if robot < 0:
             return np.arange(axes.tray)
-        return np.array(sorted(axes.of_robot(robot)), np.intp)
+        return np.array(sorted(axes.of_robot[robot]), np.intp)
 
 
 def _late(kept: deque[tuple[Array, Array]]) -> Measure:

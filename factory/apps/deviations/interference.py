@@ -30,8 +30,8 @@ class Interference:
         self._world, self._m, self._d = world, world.m, world.d
         self._axes = axes = world.motion.axes
         self._robots = slice(axes.tray)
-        self._dof = np.concatenate([axes.dof[self._robots], axes.across.dof[:, 1]])
-        self._actuator = np.concatenate([axes.actuator[self._robots], axes.across.actuator])
+        self._dof = np.concatenate([axes.dof[self._robots], axes.curves.dof[:, 1]])
+        self._actuator = np.concatenate([axes.actuator[self._robots], axes.curves.actuator[:, 0]])
         self._gain = np.ones(len(self._actuator))
         self._measures: list[Measure] = []
         self._measured: tuple[Array, Array] | None = None
@@ -108,7 +108,7 @@ class Interference:
             x, speed = self._axes.measured(self._d)
             wrong = np.stack([self._measured[0] - x, self._measured[1] - speed])
             kp, kv = self._m.actuator_biasprm[self._actuator, 1:3].T
-            off, slip = self._axes.across.spread(x, wrong)
+            off, slip = self._axes.curves.spread(x, wrong)
             bias += kp * off + kv * slip
             self._world.motion.sleep.wake(self._world.motion.axes.body[self._robots].tolist())
         self._bias[self._actuator, 0] = bias
@@ -127,9 +127,9 @@ class Interference:
 
     def _second(self, axes: Index) -> Index:
         """Which of some axes have a second slide."""
-        return self._axes.across.among(np.asarray(axes))[0]
+        return self._axes.curves.among(np.asarray(axes))[0]
 
     def _slides(self, axes: Index) -> Index:
         """The slides of axes: their own, and then the second ones."""
-        rows = self._axes.across.among(np.asarray(axes))[1]
+        rows = self._axes.curves.among(np.asarray(axes))[1]
         return np.concatenate([np.asarray(axes), self._axes.tray + rows])

@@ -90,8 +90,9 @@ class FactoryEnv(gymnasium.Env[EnvObservation, EnvAction]):
         layout, tick = first.layout, first.request.settings.tick
         self._ticks = max(1, round(interval / tick))
         self._interval = self._ticks * tick
+        count = len(layout.guidepaths)
         ways = [path.length for path in layout.guidepaths]
-        ways += [layout.strokes[robot] for robot in layout.factory.strokes]
+        ways += [high for _, high in layout.spans[count:]]
         axes, robots = len(ways), len(self.factory.robots)
         operations = len(self.factory.operations)
         self.action_space = spaces.Dict(

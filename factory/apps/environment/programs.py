@@ -45,7 +45,7 @@ class Programs:
 
     def _there(self, operation: Operation, seen: EnvObservation) -> bool:
         """Whether all axes of an operation stand at their goals."""
-        axes = [*self._factory.axes[operation.index]]
+        axes = [*self._factory.moves[operation.index]]
         off = np.abs(seen["position"][axes] - self._goals[operation.index])
         return bool((off < NEAR).all() and (np.abs(seen["speed"][axes]) < SLOW).all())
 
@@ -54,7 +54,7 @@ class Programs:
         numbers = self._factory.robots[robot].operations
         operation = self._factory.operations[numbers[self._done[robot] % len(numbers)]]
         number, legal = operation.index + 1, seen["legal"][robot]
-        axes = self._factory.axes[operation.index]
+        axes = self._factory.moves[operation.index]
         for axis, goal in zip(axes, self._goals[operation.index].tolist(), strict=True):
             if self._factory.robot_of(axis) == robot:
                 setpoint[axis] = goal

@@ -24,18 +24,16 @@ def goals(model: Model) -> Json:
     robots = layout.factory.robots
 
     def places(operation: Operation) -> Iterator[tuple[str, float]]:
-        axes = layout.factory.axes[operation.index]
+        axes = layout.factory.moves[operation.index]
         for axis, goal in zip(axes, modes[operation.index].goals.tolist(), strict=True):
-            robot = robots[layout.factory.robot_of(axis)]
-            if axis >= len(robots):
-                yield names.hoist(robot.name), scales[names.lift(robot.name)].at(goal)
-            elif layout.guidepaths[axis].bends:
-                back, across = layout.guidepaths[axis].framed(goal, goal)[0][0].tolist()
-                slides = names.slide(robot.name), names.slide_across(robot.name)
-                yield names.drive(robot.name), scales[slides[0]].at(back)
-                yield names.drive_across(robot.name), scales[slides[1]].at(across)
+            if axis in layout.curves[0]:
+                at = layout.guidepaths[axis].framed(goal, goal)[0][0].tolist()
+                moved = names.moved_along(robots[axis].name)
+                for (joint, actuator), place in zip(moved, at, strict=True):
+                    yield actuator, scales[joint].at(place)
             else:
-                yield names.drive(robot.name), scales[names.first_axis(robot)].at(goal)
+                of = layout.factory.axes[axis]
+                yield names.actuator(of), scales[names.joint(of)].at(goal)
 
     return {
         "operations": [

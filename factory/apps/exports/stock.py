@@ -23,7 +23,6 @@ from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.starting import start_positions
 from factory.support.markup import quoteattr
-from factory.theory.problem.robot_bodies import LIFT_JOINT
 
 LAW = ("kp", "kv", "forcerange")
 """What an actuator of a run and the written one have in common."""
@@ -73,21 +72,23 @@ class Scale:
 
 def scales_of(layout: Layout) -> dict[str, Scale]:
     """Those of carriages and lifts, which are 0 at the start of a run, by the names of joints."""
-    robots, lifts = layout.factory.robots, layout.factory.lift_axis
     at = start_positions(layout, layout.factory.net.initial_marking).tolist()
-    carriages = {names.first_axis(robot): Scale(at[robot.index], -1.0) for robot in robots}
-    for robot in layout.bent[0]:
-        back, across = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
-        carriages[names.slide(robots[robot].name)] = Scale(back, -1.0)
-        carriages[names.slide_across(robots[robot].name)] = Scale(across)
-    return carriages | {names.lift(robots[r].name): Scale(at[axis]) for r, axis in lifts.items()}
+    scales = {
+        names.joint(axis): Scale(at[axis.index], 1.0 if axis.motion.hangs else -1.0)
+        for axis in layout.factory.axes
+    }
+    for robot in layout.curves[0]:
+        back, *further = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
+        (first, _), *others = names.moved_along(layout.factory.robots[robot].name)
+        scales[first] = Scale(back, -1.0)
+        scales |= {joint: Scale(x) for (joint, _), x in zip(others, further, strict=True)}
+    return scales
 
 
 def _weights(model: Model) -> dict[str, float]:
     """What lifts, sliders and the shutter carry at the start [N], by the names of joints."""
-    robots = model.factory.robots
-    lifts = [robots[number] for number in model.factory.strokes]
-    masses = {names.lift(r.name): r.body.axis(LIFT_JOINT).mass for r in lifts}
+    hanging = (axis for axis in model.factory.axes if axis.motion.hangs)
+    masses = {names.joint(axis): axis.joint.mass for axis in hanging}
     for outlet in outlets_of(model.layout):
         masses[names.slider(outlet.label)] = SLIDER_MASS + model.masses[outlet.label]
     masses[names.SHUTTER] = SHUTTER_MASS

@@ -23,7 +23,6 @@ from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.mesh_files import stl
 from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.turning import upright
-from factory.floor.layout.guidepath import LEVER
 
 if TYPE_CHECKING:
     from factory.api import mujoco
@@ -41,7 +40,9 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
     project = subject.project
     model = written(physical_model(project.layout, 1, project.settings, project.catalogue))
     folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
-    writer = _Writer(load(model), project.settings.speed, folder)
+    speed = project.settings.speed
+    speeds = {names.joint(axis): speed / axis.motion.lever for axis in project.factory.axes}
+    writer = _Writer(load(model), speed, speeds, folder)
     text = writer.text(subject.stem)
     if not writer.files:
         return text
@@ -49,12 +50,15 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
 
 
 class _Writer:
-    """Writes the bodies of a compiled model as links; `files`: the meshes that these refer to."""
+    """Writes the bodies of a compiled model as links; `files`: the meshes that these refer to.
+    Joints go at a `speed` [m/s], but for those with `speeds` of their own."""
 
-    def __init__(self, m: mujoco.MjModel, speed: float, folder: str) -> None:
+    def __init__(
+        self, m: mujoco.MjModel, speed: float, speeds: Mapping[str, float], folder: str
+    ) -> None:
         from factory.api import mujoco
 
-        self.m, self.speed, self.folder = m, speed, folder
+        self.m, self.speed, self.speeds, self.folder = m, speed, speeds, folder
         self.geom, joint = mujoco.mjtGeom, mujoco.mjtJoint
         self.kinds = {int(joint.mjJNT_SLIDE): "prismatic", int(joint.mjJNT_HINGE): "revolute"}
         self.files: dict[str, bytes] = {}
@@ -100,15 +104,15 @@ class _Writer:
         m, name = self.m, self.m.body(body).name
         joint = m.body_jntadr[body]
         kind = self.kinds.get(int(m.jnt_type[joint]), "floating") if joint >= 0 else "fixed"
-        slides, speed = kind == "prismatic", self.speed
+        speed = self.speeds.get(m.joint(joint).name, self.speed) if joint >= 0 else self.speed
         element = add(root, "joint", name=m.joint(joint).name if joint >= 0 else name, type=kind)
         at, turn = m.body_pos[body], m.body_quat[body]
-        if slides:
+        if kind == "prismatic":
             at = at - rotation(turn) @ m.jnt_axis[joint] * m.qpos0[m.jnt_qposadr[joint]]
         if kind == "revolute":
             w, _, _, z = upright(-m.jnt_axis[joint][2] * m.qpos0[m.jnt_qposadr[joint]])
             w, z = turn[0] * w - turn[3] * z, turn[0] * z + turn[3] * w
-            turn, speed = np.array([w, 0.0, 0.0, z]), speed / LEVER
+            turn = np.array([w, 0.0, 0.0, z])
         _origin(element, at, turn)
         parent = m.body(m.body_parentid[body]).name
         child = name if m.body_jntnum[body] < 2 else m.joint(joint + 1).name

@@ -56,14 +56,15 @@ class _Writer:
     def way(self, one: Presence) -> Json:
         """One presence."""
         name, held = one.machine, self._model.carried.carried.get(one.label, ())
-        robot = self._model.factory.robots[one.robot].name
-        of = self._model.factory.robots[one.robot]
-        first, tool = names.first_axis(of), [names.tool(robot)] * of.fixed
+        factory = self._model.factory
+        robot = factory.robots[one.robot].name
         if name == robot:
-            bodies, joints = [names.carriage(robot)], [first]
-            joints += [names.slide_across(robot)] * (one.bodies.bent is not None)
-            if one.robot in self._model.factory.strokes:
-                bodies, joints = [*bodies, names.head(robot), *tool], [*joints, names.lift(robot)]
+            axes = [factory.axes[axis] for axis in factory.axes_of(one.robot)]
+            joints = [names.joint(axis) for axis in axes]
+            if one.bodies.bent is not None:
+                joints[:1] = [joint for joint, _ in names.moved_along(robot)]
+            # from the carriage up: what goes up is above what travels, and below what turns
+            bodies = [*dict.fromkeys([names.carriage(robot), *map(names.moved, axes[::-1])])]
             scales = [self._scales[joint] for joint in joints]
             return _way(one, bodies, joints, [names.grip(robot, label) for label in held], scales)
         if name == "tray":

@@ -182,7 +182,7 @@ def misplaced(
         part = anatomy.part[weld]
         if holder is None or holder[0] != GRIP:
             continue
-        if factory.robots[holder[1]].fixed:
+        if not factory.robots[holder[1]].travels:
             slides[weld, 0] = subject.gear_goals[holder[1]][-1]
         elif {part} in ({*inside[x]} for x in factory.deliveries(holder[1])):
             half = subject.fed(part) / 2

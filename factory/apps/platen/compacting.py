@@ -92,7 +92,7 @@ class _Search:
         full = rounding_for(pace.speed, pace.acceleration)
         self.roundings = [full, *(small for small in SHARPER if small < full)]
         self.rng = np.random.default_rng(seed)
-        goes = [r for r, path in enumerate(layout.guidepaths) if r and not path.fixed]
+        goes = [r for r, path in enumerate(layout.guidepaths) if r and path.travels]
         self.reach = {robot: Reach.of(layout, robot) for robot in goes}
         on = self.ground.on
         self.under = [branch_of(on, robot) for robot in range(len(on))]

@@ -54,9 +54,7 @@ class Corridors:
         for (robot, place), stretches in self._ways.items():
             if not marked[place]:
                 continue
-            axes = [robot]
-            if robot in self._factory.lift_axis:
-                axes.append(self._factory.lift_axis[robot])
+            axes = self._factory.axes_of(robot)
             sweeps = [*self._left(stretches, fired, x)]
             for which, axis in enumerate(axes):
                 other = float(x[axes[1 - which]]) if len(axes) == 2 else 0.0
@@ -65,7 +63,7 @@ class Corridors:
                 high[axis] = max(max(span) for span in spans)
         for operation, mode in zip(self._factory.operations, self._modes, strict=True):
             if marked[operation.place]:
-                axes = [*self._factory.axes[operation.index]]
+                axes = [*self._factory.moves[operation.index]]
                 _keep_gates(mode, axes, x, low, high)
                 _keep_apart(mode, axes, x, stops, low, high)
         return low, high

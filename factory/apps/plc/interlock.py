@@ -229,7 +229,7 @@ class PlantInterlock:
 
     def _far(self, operation: Operation) -> str:
         """The axis that is out of a grip's reach from where parts change hands; "" for none."""
-        axes = self.factory.axes[operation.index]
+        axes = self.factory.moves[operation.index]
         away = np.abs(self.world.sense()[0][list(axes)] - self._goals[operation.index])
         worst = int(away.argmax())
         if away[worst] <= REACH:
@@ -240,7 +240,7 @@ class PlantInterlock:
 
     def _moving(self, operation: Operation) -> str:
         """The axis that is too fast for parts to change hands; "" for none."""
-        axes = self.factory.axes[operation.index]
+        axes = self.factory.moves[operation.index]
         speeds = np.abs(self.world.sense()[1][list(axes)])
         worst = int(speeds.argmax())
         if speeds[worst] <= REST:

@@ -233,11 +233,9 @@ class OpcuaPlant:
 
 def _names(factory: Factory) -> dict[str, Sequence[str]]:
     """What the signals are of, in their order."""
-    robots = [robot.name for robot in factory.robots]
-    lifts = [f"{factory.robots[robot].name} lift" for robot in factory.strokes]
     return {
-        "Axes": [*robots, *lifts],
-        "Robots": robots,
+        "Axes": [axis.name for axis in factory.axes],
+        "Robots": [robot.name for robot in factory.robots],
         "Stations": [*(leaf.label for leaf in factory.leaves), "outfeed"],
         "Operations": [operation.label for operation in factory.operations],
     }

@@ -96,7 +96,7 @@ class ReturnMotion:
     def home(self, robot: int) -> list[Goal]:
         """The way of a robot to its B end: its lift first, unless the lift is adjusted to its
         payload, which returns at the height at which it came."""
-        lift, layout = self._layout.factory.lift_axis.get(robot), self._layout
+        lift, layout = self._layout.factory.up(robot), self._layout
         stays = robot in layout.factory.adjusted
         rise = [] if lift is None or stays else [(lift, _highest(layout, robot))]
         return [*rise, (robot, layout.guidepaths[robot].length)]
@@ -113,7 +113,7 @@ class ReturnMotion:
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
         marking = self._without_skipped(robot, marking)
         step, _ = gear.step_in(marking)
-        at, lift = start_positions(layout, marking), self._layout.factory.lift_axis.get(robot)
+        at, lift = start_positions(layout, marking), layout.factory.up(robot)
         goals = [(robot, _waiting(layout, robot, step))]
         if lift is None:
             return goals
@@ -172,17 +172,17 @@ def _highest(layout: Layout, robot: int) -> float:
 def _goals(layout: Layout) -> Iterable[Goal]:
     """All goals to which a robot can be sent."""
     factory = layout.factory
-    lifts = factory.lift_axis
     for robot in factory.robots:
+        up = factory.up(robot.index)
         yield _rounded((robot.index, layout.guidepaths[robot.index].length))
         for step, number in enumerate(robot.operations):
             yield _rounded((robot.index, _waiting(layout, robot.index, step)))
             if not factory.operations[number].inputs:
                 yield _rounded((robot.index, _aside(layout, factory.operations[number])))
-            if robot.index in lifts:
-                yield _rounded((lifts[robot.index], layout.visits[number, robot.index].up))
-        if robot.index in lifts:
-            yield _rounded((lifts[robot.index], _highest(layout, robot.index)))
+            if up is not None:
+                yield _rounded((up, layout.visits[number, robot.index].up))
+        if up is not None:
+            yield _rounded((up, _highest(layout, robot.index)))
 
 
 def _rounded(goal: Goal) -> Goal:

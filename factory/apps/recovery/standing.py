@@ -40,8 +40,7 @@ class MotionHold:
         self._now: frozenset[int] = frozenset()
         self.stood: list[Stood] = []
         factory = simulation.layout.factory
-        lifts = factory.lift_axis
-        self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
+        self._axes = [factory.axes_of(robot.index) for robot in factory.robots]
         self._begun: dict[int, float] = {}
         self._went: dict[int, float] = {}
 
@@ -86,7 +85,7 @@ class MotionHold:
             if not excused.isdisjoint(operation.robots):
                 self.begun(operation, now)
             elif now > self._late(number, now):
-                jammed += self._at_fault(modes.modes[number], [*factory.axes[number]])
+                jammed += self._at_fault(modes.modes[number], [*factory.moves[number]])
         going = supervisor.ahead.going(supervisor.active.ahead)
         went = {n: self._went.get(n, now) for n in going}
         self._went = {n: now if going[n].robot in excused else t for n, t in went.items()}
@@ -116,7 +115,9 @@ class MotionHold:
         bundle = Bundle.of([mode], [self._limits.of(axes)])
         asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
         stuck = asked & (np.abs(v[axes]) < STILL)
-        of_axis = {axis: robot for robot, axes_of in enumerate(self._axes) for axis in axes_of}
+        of_axis = dict[int, int]()
+        for robot, axes_of in enumerate(self._axes):
+            of_axis |= dict.fromkeys(axes_of, robot)
         return [
             *dict.fromkeys(of_axis[axis] for axis, is_so in zip(axes, stuck, strict=True) if is_so)
         ]

@@ -55,7 +55,7 @@ class Way:
 
 def ways(layout: Layout) -> dict[str, Way]:
     """The way of every label, of those that can be cut. A robot that is fixed goes none."""
-    along = (robot for robot, path in enumerate(layout.guidepaths) if not path.fixed)
+    along = (robot for robot, path in enumerate(layout.guidepaths) if path.travels)
     every = (way for robot in along for way in _ways(layout, robot))
     return {way.label: way for way in every if way.most}
 

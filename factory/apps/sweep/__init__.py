@@ -9,9 +9,9 @@ SQLite database from which a stopped sweep resumes.
 deviations and confidence intervals.
 """
 
-from factory.apps.sweep.grid import Axis, points, read_axes
+from factory.apps.sweep.grid import GridAxis, points, read_axes
 from factory.apps.sweep.recipe import Recipe
 from factory.apps.sweep.summary import Summary, summarise
 from factory.apps.sweep.sweeping import Tally, sweep
 
-__all__ = ["Axis", "Recipe", "Summary", "Tally", "points", "read_axes", "summarise", "sweep"]
+__all__ = ["GridAxis", "Recipe", "Summary", "Tally", "points", "read_axes", "summarise", "sweep"]

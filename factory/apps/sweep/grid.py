@@ -58,16 +58,16 @@ MOST = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class GridAxis:
     """A key that varies, and its distinct values in the order given."""
 
     key: str
     values: tuple[Value, ...]
 
 
-def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
+def read_axes(texts: Sequence[str]) -> tuple[GridAxis, ...]:
     """The axes of the texts of `--vary`, e.g. `seed=0:1000`. Raises InputError with every fault."""
-    axes: list[Axis] = []
+    axes: list[GridAxis] = []
     faults: list[Diagnostic] = []
     for text in texts:
         try:
@@ -85,7 +85,7 @@ def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
     return tuple(axes)
 
 
-def points(axes: Sequence[Axis]) -> Iterator[Point]:
+def points(axes: Sequence[GridAxis]) -> Iterator[Point]:
     """All points of a grid. Settings vary slowest and seeds fastest: a change of settings takes a
     new model, and of some a new layout."""
     rank = [(axis.key == "seed", axis.key not in SETTINGS) for axis in axes]
@@ -115,7 +115,7 @@ def check_value(key: str, value: Value) -> Diagnostic | None:
     return None
 
 
-def _read_axis(text: str) -> Axis:
+def _read_axis(text: str) -> GridAxis:
     key, equals, values = (word.strip() for word in text.partition("="))
     if key not in KEYS:
         hint = did_you_mean(key, KEYS, "keys")
@@ -129,7 +129,7 @@ def _read_axis(text: str) -> Axis:
         fault = check_value(key, value)
         if fault is not None:
             raise InputError(fault)
-    return Axis(key, tuple(distinct))
+    return GridAxis(key, tuple(distinct))
 
 
 def _read_item(key: str, item: str) -> Iterator[Value]:

@@ -23,7 +23,7 @@ from factory.api import (
     write_pag,
 )
 from factory.apps.runs.options import check_ideal
-from factory.apps.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
+from factory.apps.sweep.grid import DEFAULTS, SETTINGS, GridAxis, Point, Value
 from factory.floor.layout.saved import LayoutTable
 from factory.support.resources import mjcf_folder
 from factory.support.version import __version__
@@ -50,7 +50,7 @@ class Recipe:
         """The value of every key at a point."""
         return {**DEFAULTS, **self.fixed, **dict(point)}
 
-    def identity(self, axes: Sequence[Axis]) -> dict[str, Any]:
+    def identity(self, axes: Sequence[GridAxis]) -> dict[str, Any]:
         """What must not change if a sweep is resumed: product, versions, fixed values, and the keys
         that vary. The values of these may change: a grid may grow."""
         varied = sorted(axis.key for axis in axes)
@@ -74,7 +74,7 @@ class Recipe:
 
 def recipe_of(
     project: Project,
-    axes: Sequence[Axis],
+    axes: Sequence[GridAxis],
     shared: Mapping[str, Value],
     max_time: float | None = None,
     fuse: bool | None = None,

@@ -10,7 +10,7 @@ from time import perf_counter
 from typing import Any
 
 from factory.api import InputError
-from factory.apps.sweep.grid import Axis, Point, check_value, points
+from factory.apps.sweep.grid import GridAxis, Point, check_value, points
 from factory.apps.sweep.recipe import Recipe, name_of
 from factory.apps.sweep.store import Store
 from factory.apps.sweep.work import Outcome, Runner, failed
@@ -81,7 +81,7 @@ class Tally:
 
 def sweep(
     recipe: Recipe,
-    axes: Sequence[Axis],
+    axes: Sequence[GridAxis],
     database: Path,
     jobs: int = 1,
     retry: bool = False,

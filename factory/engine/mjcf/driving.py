@@ -13,11 +13,11 @@ from math import inf, sqrt
 from factory.engine.mjcf.robots import Drive
 from factory.engine.mjcf.stops import OVERLOAD
 from factory.engine.mjcf.tools import GYRATION, gyration
-from factory.floor.layout.guidepath import LEVER
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, TICK, Settings
-from factory.theory.problem.robot_bodies import FRICTION, LIFT_JOINT, RobotAxis
+from factory.theory.plant.axes import Axis
+from factory.theory.problem.robot_bodies import FRICTION, RobotAxis
 
 STIFFNESS = 70.0
 """Natural frequency of a robot's position loop at full payload [rad/s]."""
@@ -140,10 +140,11 @@ class DrivenAxis:
         """Whether its drive is sized for its load, against no more friction than usual."""
         return self.motor is None or self.motor.usual
 
-    def follows(self, settings: Settings, lever: float = 1.0) -> bool:
-        """Whether its gains are stable, do not swing, and keep it on its reference; `lever`: how
-        far it goes along for each unit [m]. The shorter the timestep, the sooner."""
+    def follows(self, settings: Settings) -> bool:
+        """Whether its gains are stable, do not swing, and keep it on its reference. The shorter the
+        timestep, the sooner."""
         drive, h = self.drive(settings), settings.step
+        lever = 1.0 if self.motor is None else self.motor.motion.lever
         empty, mass = self.own + drive.inertia, self.own + drive.inertia + self.load
         stable = drive.kp <= PUSHED * empty / h**2 and drive.kv <= DAMPED * empty / h
         calm = drive.kv >= 2 * SETTLED * sqrt(drive.kp * mass)
@@ -169,66 +170,57 @@ def drive_for(
     return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
 
 
-def moment_of(axis: RobotAxis) -> float:
-    """Moment of inertia [kg m²] of a fixed robot's tool without payload, and of its motor."""
-    return round(GYRATION * axis.mass + axis.armature, 9)
+def driven(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
+    """What the drive of a robot's axis moves, with a load [kg]; where the axis turns, with the
+    load's moment of inertia [kg m²].
+
+    What hangs from a drive weighs on it; what a guide bears rubs there.
+    """
+    motion = axis.motion
+    empty = axis.mass + axis.armature
+    if motion.rotary:
+        empty = round(GYRATION * axis.mass + axis.armature, 9)
+    a, held = settings.acceleration / motion.lever, 2 * axis.friction
+    if motion.rolls:
+        held = 2 * (axis.friction + ROLLING * load * GRAVITY)
+    if motion.hangs:
+        held = 2 * axis.friction + SLACK * (axis.mass + load) * GRAVITY
+    push = a + GRAVITY if motion.hangs else a
+    stiffness = STIFFNESS if motion.rolls else HOIST_STIFFNESS
+    return DrivenAxis(empty, load, a, push, stiffness, held=held, motor=axis)
 
 
-def along(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
-    """A robot's axis along its guidepath, with a load [kg]."""
-    empty, a = axis.mass + axis.armature, settings.acceleration
-    held = 2 * (axis.friction + ROLLING * load * GRAVITY)
-    return DrivenAxis(empty, load, a, a, STIFFNESS, held=held, motor=axis)
-
-
-def turning(axis: RobotAxis, moment: float, settings: Settings) -> DrivenAxis:
-    """The axis of a fixed robot's tool, with a load's moment of inertia [kg m²]."""
-    a, held = settings.acceleration / LEVER, 2 * axis.friction
-    return DrivenAxis(moment_of(axis), moment, a, a, HOIST_STIFFNESS, held=held, motor=axis)
-
-
-def up(axis: RobotAxis, load: float, settings: Settings) -> DrivenAxis:
-    """The axis of a robot's lift, with a load [kg]."""
-    empty, a = axis.mass + axis.armature, settings.acceleration
-    held = 2 * axis.friction + SLACK * (axis.mass + load) * GRAVITY
-    return DrivenAxis(empty, load, a, a + GRAVITY, HOIST_STIFFNESS, held=held, motor=axis)
-
-
-def first_axis(
-    layout: Layout,
-    robot: int,
-    load: float,
-    settings: Settings,
-    gain: float = 1.0,
-    room: float = inf,
-) -> DrivenAxis:
-    """A robot's first axis: along its guidepath; of one that is fixed the one that turns. Raises
-    InputError (NoGrip) where that has no hand."""
-    axis = layout.factory.robots[robot].body.first
-    if not layout.guidepaths[robot].fixed:
-        return along(axis, load, settings)
-    return turning(axis, load * gyration(layout, robot) ** 2, settings)
-
-
-def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
-    """The heaviest load that each robot carries [kg], by what labels weigh."""
-    operations, robots = layout.factory.operations, layout.factory.robots
+def driven_axes(
+    layout: Layout, masses: Mapping[str, float], settings: Settings
+) -> list[DrivenAxis]:
+    """What the drive of each axis of a factory moves, with the heaviest that it carries, by what
+    labels weigh [kg]. Raises InputError (NoGrip) where a robot that turns has no hand."""
+    loads = heaviest(layout, masses)
     return [
-        max(
-            masses.get(o.after[o.robots.index(robot.index)], 0.0)
-            for o in (operations[number] for number in robot.operations)
-        )
-        for robot in robots
+        driven(axis.joint, load * inertia_of(layout, axis), settings)
+        for axis, load in zip(layout.factory.axes, loads, strict=True)
     ]
 
 
-def lifted(layout: Layout, masses: Mapping[str, float]) -> dict[int, float]:
-    """The heaviest load that each robot with a lift delivers [kg], by what labels weigh."""
+def inertia_of(layout: Layout, axis: Axis) -> float:
+    """What a load of 1 kg adds to what an axis moves: 1 kg, or its moment of inertia [kg m²] where
+    the axis turns. Raises InputError (NoGrip) as `gyration` does."""
+    return gyration(layout, axis.robot.index) ** 2 if axis.motion.rotary else 1.0
+
+
+def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
+    """The heaviest load of each axis [kg], by what labels weigh: what its robot carries, and
+    delivers where it goes up."""
     factory = layout.factory
-    return {
-        robot: max(masses[label] for label in factory.deliveries(robot))
-        for robot in factory.strokes
-    }
+    carried = [
+        max(
+            masses.get(o.after[o.robots.index(robot.index)], 0.0)
+            for o in (factory.operations[number] for number in robot.operations)
+        )
+        for robot in factory.robots
+    ]
+    robots = (axis.robot.index for axis in factory.axes[len(carried) :])
+    return [*carried, *(max(map(masses.__getitem__, factory.deliveries(r))) for r in robots)]
 
 
 def weights_of(layout: Layout) -> dict[str, float]:
@@ -247,30 +239,22 @@ def check_drives(layout: Layout, settings: Settings) -> None:
     motors = {axis for robot in layout.factory.robots for axis in robot.body.axes}
     if all(motor.usual and motor.force == inf for motor in motors):
         return
-    axes = _axes(layout, settings)
-    faults = [fault for each in axes for fault in _faults(*each, settings)]
+    axes = driven_axes(layout, weights_of(layout), settings)
+    names = (axis.robot.name for axis in layout.factory.axes)
+    pairs = zip(names, axes, strict=True)
+    faults = [fault for each in pairs for fault in _faults(*each, settings)]
     if faults:
         raise InputError(faults)
 
 
-def _axes(layout: Layout, settings: Settings) -> Iterator[tuple[str, DrivenAxis, float]]:
-    """The axes of all robots, with the robot's name and how far each goes along for a unit."""
-    robots, masses = layout.factory.robots, weights_of(layout)
-    for robot, load in zip(robots, heaviest(layout, masses), strict=True):
-        lever = layout.guidepaths[robot.index].lever
-        yield robot.name, first_axis(layout, robot.index, load, settings), lever
-    for number, load in lifted(layout, masses).items():
-        yield robots[number].name, up(robots[number].body.axis(LIFT_JOINT), load, settings), 1.0
-
-
-def _faults(name: str, axis: DrivenAxis, lever: float, settings: Settings) -> Iterator[Diagnostic]:
+def _faults(name: str, axis: DrivenAxis, settings: Settings) -> Iterator[Diagnostic]:
     """What is wrong with the drive of one axis."""
     motor = axis.motor
     assert motor is not None, "it is a robot's"
     each = [settings]
     if settings.timestep == AUTO:
         each = [replace(settings, timestep=TICK / n, substeps=n) for n in STEPS]
-    unit, of = ("N", "kg") if lever == 1.0 else ("N m", "kg m²")
+    unit, of = ("N m", "kg m²") if motor.motion.rotary else ("N", "kg")
     carries = f"{name}, with {axis.load:.3g} {of}"
     moved = axis.drive(each[-1]).inertia + axis.own + axis.load
     needed = RESERVE * moved * axis.push + axis.held / 2
@@ -282,7 +266,7 @@ def _faults(name: str, axis: DrivenAxis, lever: float, settings: Settings) -> It
             motor.position,
             f"valid: a forcerange from {needed:.3g} {unit}, less --acceleration, lighter parts",
         )
-    if axis.usual or any(axis.follows(s, lever) for s in each):
+    if axis.usual or any(axis.follows(s) for s in each):
         return
     drive, sized = (a.drive(each[-1]) for a in (axis, replace(axis, motor=None)))
     yield Diagnostic(

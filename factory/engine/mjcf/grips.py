@@ -46,7 +46,7 @@ class Grip:
         place = place_in(self.layout.product, self.centre, middle, height)
         ahead, aside, up = turned(place, path.heading)
         hand = self.layout.hand(self.robot)
-        if not path.fixed or hand is None:
+        if path.travels or hand is None:
             return ahead, aside, up
         x, y, _ = self.layout.mount(self.robot).reached(hand)[0]
         return ahead - x, aside - y, up

@@ -22,10 +22,7 @@ from factory.engine.mjcf.driving import (
     GRAVITY,
     HOIST_STIFFNESS,
     drive_for,
-    first_axis,
-    heaviest,
-    lifted,
-    up,
+    driven_axes,
 )
 from factory.engine.mjcf.elements import fill
 from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
@@ -33,9 +30,8 @@ from factory.engine.mjcf.insets import Insets, insets_of
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.engine.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.engine.mjcf.robot_bodies import add_robots
-from factory.engine.mjcf.robots import MOTOR, Drive, Hoist, add_paints
+from factory.engine.mjcf.robots import MOTOR, Drive, add_paints
 from factory.engine.mjcf.scene import add_scene
-from factory.engine.mjcf.stops import stops_of
 from factory.engine.mjcf.unseen import leave_out_what_is_shown
 from factory.engine.mjcf.welds import add_exclusions, add_welds
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside, bodies_of
@@ -48,7 +44,6 @@ from factory.support.settings import Settings
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.approaches import Pair
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.robot_bodies import LIFT_JOINT
 from factory.theory.problem.robot_types import Catalogue
 
 SKELETON = Path(__file__).with_name("skeleton.xml")
@@ -72,7 +67,7 @@ class Model:
         carried: the bodies that robots carry.
         copies: number of copies of each.
         masses: of each label carried [kg].
-        drives: of each robot.
+        drives: of each axis.
         insets: what is taken off the shapes that collide, and the pairs of parts without contact.
         xml: the text.
         files: meshes by name.
@@ -169,10 +164,7 @@ def build_model(
     masses = {
         label: sum(bodies.mass[body] for body in inner) for label, inner in bodies.carried.items()
     }
-    drives = tuple(
-        first_axis(layout, robot, load, settings).drive(settings)
-        for robot, load in enumerate(heaviest(layout, masses))
-    )
+    drives = tuple(axis.drive(settings) for axis in driven_axes(layout, masses, settings))
     root = ElementTree.parse(SKELETON).getroot()
     root.set("model", product_name(factory))
     section = {child.tag: child for child in root}
@@ -183,8 +175,7 @@ def build_model(
     apart = tuple(m for pair in insets.excluded for m in bodies.meeting(factory, pair))
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
-    hoists = _hoists(layout, masses, settings)
-    add_robots(layout, catalogue, drives, hoists, section)
+    add_robots(layout, catalogue, drives, section)
     load = max(masses[product] for product in factory.products)
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
@@ -207,7 +198,7 @@ def build_model(
     fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
-    joints = len(factory.robots) + len(hoists) + 2 + len(sliders) + sum(copies.values())
+    joints = len(factory.axes) + 2 + len(sliders) + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
 
@@ -223,15 +214,6 @@ def product_name(factory: Factory) -> str:
     """The name of the model: that of the PAG file, without folder and ending."""
     name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
     return name or "factory"
-
-
-def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
-    """The lifts, for the heaviest load of each: what it delivers."""
-    robots, loads, hoists = layout.factory.robots, lifted(layout, masses), {}
-    for robot, stroke in layout.strokes.items():
-        drive = up(robots[robot].body.axis(LIFT_JOINT), loads[robot], settings).drive(settings)
-        hoists[robot] = Hoist(stroke, drive, stops_of(0.0, stroke, layout.clearance))
-    return hoists
 
 
 def _sliders(

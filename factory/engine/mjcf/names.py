@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from factory.theory.plant.axes import Axis
 from factory.theory.plant.robot import Robot
 
 
@@ -10,23 +11,33 @@ def carriage(robot: str) -> str:
     return f"{robot}/carriage"
 
 
+def joint(axis: Axis) -> str:
+    """The joint of an axis: `r3/slide`, `r3/lift`, `r3/turn`."""
+    return f"{axis.robot.name}/{axis.joint.joint}"
+
+
+def first_axis(robot: Robot) -> str:
+    """The joint of a robot's first axis: `r3/slide`, `r3/turn`."""
+    return f"{robot.name}/{robot.body.first.joint}"
+
+
+def actuator(axis: Axis) -> str:
+    """The actuator of an axis: `r3/drive`, `r3/hoist`."""
+    return f"{axis.robot.name}/{axis.motion.drive}"
+
+
+def moved(axis: Axis) -> str:
+    """The body that an axis moves: `r3/carriage`, `r3/head`, `r3/tool`."""
+    return f"{axis.robot.name}/{axis.motion.body}"
+
+
 def slide(robot: str) -> str:
     """The joint of a robot along its guidepath, `r3/slide`."""
     return f"{robot}/slide"
 
 
-def turn(robot: str) -> str:
-    """The joint of a fixed robot's tool, about the vertical, `r3/turn`."""
-    return f"{robot}/turn"
-
-
-def first_axis(robot: Robot) -> str:
-    """The joint of a robot's first axis: along its guidepath, or about the vertical."""
-    return turn(robot.name) if robot.fixed else slide(robot.name)
-
-
 def drive(robot: str) -> str:
-    """The actuator of a robot, `r3/drive`."""
+    """The actuator of a robot's first axis, `r3/drive`."""
     return f"{robot}/drive"
 
 
@@ -41,6 +52,12 @@ def drive_across(robot: str) -> str:
     return f"{robot}/drive_across"
 
 
+def moved_along(robot: str) -> tuple[tuple[str, str], ...]:
+    """The joints, and their actuators, that the first axis of a robot moves where its guidepath has
+    bends."""
+    return (slide(robot), drive(robot)), (slide_across(robot), drive_across(robot))
+
+
 def head(robot: str) -> str:
     """The body of a robot that its lift moves, and that holds its payload, `r3/head`."""
     return f"{robot}/head"
@@ -49,16 +66,6 @@ def head(robot: str) -> str:
 def tool(robot: str) -> str:
     """The body of a fixed robot that turns, and that holds its payload, `r3/tool`."""
     return f"{robot}/tool"
-
-
-def lift(robot: str) -> str:
-    """The vertical joint of a robot, `r3/lift`."""
-    return f"{robot}/lift"
-
-
-def hoist(robot: str) -> str:
-    """The actuator of a lift, `r3/hoist`."""
-    return f"{robot}/hoist"
 
 
 def copy(label: str, number: int) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -10,7 +10,14 @@ import numpy as np
 from factory.engine.mjcf.elements import add, add_shown, numbers
 from factory.engine.mjcf.hands import Styles, load_hand
 from factory.engine.mjcf.names import carriage
-from factory.engine.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
+from factory.engine.mjcf.robots import (
+    Drive,
+    Fitted,
+    Held,
+    RobotModel,
+    instantiate,
+    load_robot_model,
+)
 from factory.engine.mjcf.scene import add_follower
 from factory.engine.mjcf.stops import stops_of
 from factory.floor.layout.hands.hand import Hand
@@ -107,50 +114,32 @@ def _text(digits: str, at: Array, right: Array, up: Array, room: Array) -> Array
 def add_robots(
     layout: Layout,
     catalogue: Catalogue,
-    drives: tuple[Drive, ...],
-    hoists: Mapping[int, Hoist],
+    drives: Sequence[Drive],
     section: Mapping[str, Element],
 ) -> None:
     """The robots' bodies, actuators, and what their types' files share, into the sections of a
-    model."""
+    model, with the drive of each axis."""
     factory = layout.factory
     models: dict[str, RobotModel] = {}
     styles: dict[str, Styles] = {}
-    for robot, path, drive in zip(factory.robots, layout.guidepaths, drives, strict=True):
+    fitted = [
+        Fitted(axis, drive, stops_of(*span, layout.clearance))
+        for axis, drive, span in zip(factory.axes, drives, layout.spans, strict=True)
+    ]
+    for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
         if robot.type not in models:
             model = models[robot.type] = load_robot_model(catalogue[robot.type])
             section["default"].append(model.defaults)
             section["asset"].extend(model.assets)
         role = role_of(factory, robot.index)
-        held = Held(_low(layout, robot.index))
-        if layout.hands:
-            held = Held(0.0, _style(layout.hand(robot.index), styles), limbs(layout, robot.index))
-        body, actuators = instantiate(
-            models[robot.type],
-            robot.name,
-            path,
-            drive,
-            stops_of(*layout.ends(robot.index), layout.clearance),
-            held,
-            role,
-            hoists.get(robot.index),
-        )
+        held = Held(_style(layout.hand(robot.index), styles), limbs(layout, robot.index))
+        axes = [fitted[axis] for axis in factory.axes_of(robot.index)]
+        body, actuators = instantiate(models[robot.type], path, axes, held, role)
         add_number(body, section["asset"], robot.name, path, role)
         if robot.index == 0:
             add_follower(body, layout)
         section["worldbody"].append(body)
         section["actuator"].extend(actuators)
-
-
-def _low(layout: Layout, robot: int) -> float:
-    """How far above z0 the lowest point of a robot's payload is carried, with its lift down [m]."""
-    factory, product = layout.factory, layout.product
-    ground, heights = float(product.low[2]), list[float]()
-    for tour, label in zip(factory.tours[robot], factory.deliveries(robot), strict=False):
-        low = min(float(product.solids[part].low[2]) for part in factory.contents[label])
-        heights.append(low - ground + layout.visits[tour[0], robot].height)
-    first = factory.robots[robot].operations[0]
-    return min(heights, default=layout.visits[first, robot].height)
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:
@@ -167,7 +156,7 @@ def role_of(factory: Factory, robot: int) -> str:
     """What a robot does, for its paint."""
     if robot == 0:
         return "output"
-    if factory.robots[robot].fixed or not factory.deliveries(robot):
+    if not (factory.robots[robot].travels and factory.deliveries(robot)):
         return "tool"
     first = factory.first(robot)
     return "carrier" if first.inputs else "fed"

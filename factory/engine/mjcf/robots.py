@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
-from math import atan2, cos, hypot, sin
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -14,12 +13,13 @@ import numpy as np
 from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.hands import Styles, add_hand
-from factory.engine.mjcf.names import carriage, drive_across, head, slide_across
+from factory.engine.mjcf.names import carriage, drive_across, head, slide_across, tool
 from factory.engine.mjcf.stops import Stops
 from factory.engine.mjcf.tools import TOOL, mount_tool
-from factory.floor.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.hands.limbs import Limb
-from factory.floor.layout.layout import Guidepath, Point2
+from factory.floor.layout.layout import Guidepath
+from factory.theory.plant.axes import Axis
 from factory.theory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody
 from factory.theory.problem.robot_types import RobotType
 
@@ -32,12 +32,9 @@ CAP = "cap"
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """How a robot holds. Without a hand: `top`, how far above z0 the lowest point of its payload is
-    carried, with the lift down [m]; the finger's pad reaches up to it. With one: the `limbs` of it,
-    and what they look like, `styles`, None without."""
+    """The hand of a robot: its `limbs`, and what they look like, `styles`."""
 
-    top: float
-    styles: Styles | None = None
+    styles: Styles
     limbs: tuple[Limb, ...] = ()
 
 
@@ -137,29 +134,35 @@ def add_paints(asset: Element) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Hoist:
-    """A robot's lift: how far it goes up [m], its drive, and its stops."""
+class Fitted:
+    """An axis of a robot in a model.
 
-    stroke: float
+    Attributes:
+        axis: the axis.
+        drive: its drive.
+        stops: its end stops.
+    """
+
+    axis: Axis
     drive: Drive
     stops: Stops
 
 
 def instantiate(
-    model: RobotModel,
-    robot: str,
-    path: Guidepath,
-    drive: Drive,
-    stops: Stops,
-    held: Held,
-    role: str = "",
-    hoist: Hoist | None = None,
+    model: RobotModel, path: Guidepath, fitted: Sequence[Fitted], held: Held, role: str = ""
 ) -> tuple[Element, list[Element]]:
-    """The body of one robot at its B end, its lift down, between its `stops`, and its actuators.
+    """The body of one robot at its B end, down, and its actuators.
 
-    `held`: how it holds. `role`: one of ROLES; geometry of the material `paint` takes its colour.
-    `hoist`: for a type with a lift.
+    Args:
+        model: the file of its type.
+        path: its guidepath.
+        fitted: its axes, the first one first. Other joints of its type are left out.
+        held: its hand.
+        role: one of ROLES; geometry of the material `paint` takes its colour.
     """
+    axes = {each.axis.joint.joint: each for each in fitted}
+    first, *_ = fitted
+    robot = first.axis.robot.name
     body = _prefixed(model.body, model.name, names=False)
     for node in body.iter():
         if "name" in node.attrib:
@@ -171,44 +174,38 @@ def instantiate(
     body.set("pos", numbers((x, y, 0)))
     body.set("quat", numbers(heading_quaternion(path)))
     body.set("sleep", "allowed")
-    if held.styles is None:
-        _stretch(body, path, held.top, hoist)
-    else:
-        towers = any(limb.name == "tower" for limb in held.limbs)
-        _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
-        lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
-        turning = [limb for limb in held.limbs if path.fixed and limb.name in TOOL]
-        others = [limb for limb in held.limbs if limb not in turning]
-        add_hand(body, lifted, held.styles, robot, others, model.name)
-        tool = next((b for b in body.iter("body") if b.get("name") == names.tool(robot)), None)
-        add_hand(body, tool, held.styles, robot, turning, model.name)
-    first = names.turn(robot) if path.fixed else names.slide(robot)
-    slide = next(j for j in body.iter("joint") if j.get("name") == first)
-    slide.set("ref", number(path.length))
-    stops.limit(slide)
+    bodies = {inner.get("name"): inner for inner in body.iter("body")}
+    towers = any(limb.name == "tower" for limb in held.limbs)
+    _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
+    turning = [limb for limb in held.limbs if not path.travels and limb.name in TOOL]
+    others = [limb for limb in held.limbs if limb not in turning]
+    add_hand(body, bodies.get(head(robot)), held.styles, robot, others, model.name)
+    add_hand(body, bodies.get(tool(robot)), held.styles, robot, turning, model.name)
+    joints = {joint.get("name"): joint for joint in body.iter("joint")}
+    joint = joints[names.joint(first.axis)]
+    joint.set("ref", number(path.length))
+    first.stops.limit(joint)
     if path.turn is not None:
-        mount_tool(body, slide, path.turn, held.limbs, model.made)
-    if hoist is None:
-        _lock(body, names.lift(robot))
+        mount_tool(body, joint, path.turn, held.limbs, model.made)
     actuators: list[Element] = []
     for actuator in model.actuators:
-        kind = actuator.get("name") or ""
-        named = {"name": f"{robot}/{kind}", "joint": f"{robot}/{actuator.get('joint')}"}
-        gains = drive if kind == "drive" else hoist.drive if hoist else None
-        if gains is None:  # a lift that nothing uses
+        each = axes.get(actuator.get("joint") or "")
+        if each is None:
+            _lock(body, f"{robot}/{actuator.get('joint')}")
             continue
-        actuators.append(Element("pid", {**named, **gains.attributes()}))
-        moved = next(j for j in body.iter("joint") if j.get("name") == named["joint"])
-        add_inertia(moved, gains)
-        if hoist and gains is hoist.drive:
-            hoist.stops.limit(moved)
-        if gains is drive and path.bends:
-            actuators.append(_bend(body, moved, actuators[-1], robot, path, stops))
+        moved = joints[names.joint(each.axis)]
+        named = {"name": names.actuator(each.axis), "joint": names.joint(each.axis)}
+        actuators.append(Element("pid", {**named, **each.drive.attributes()}))
+        add_inertia(moved, each.drive)
+        if each is not first:
+            each.stops.limit(moved)
+        elif path.bends:
+            actuators.append(_bend(body, moved, actuators[-1], robot, path, each.stops))
     return body, actuators
 
 
 def _lock(body: Element, joint: str) -> None:
-    """Take a joint out of a body."""
+    """Take a joint out of a body, which nothing moves."""
     for inner in body.iter("body"):
         for each in inner.findall("joint"):
             if each.get("name") == joint:
@@ -252,7 +249,7 @@ def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: Rob
     for geom in list(body.iter("geom")):
         name = (geom.get("name") or "").rpartition("/")[2]
         if name == "arm":
-            _span(geom, (0.0, 0.0), (rim, 0.0))
+            _span(geom, 0.0, rim)
         elif name in without:
             parents[geom].remove(geom)
     for lifted in body.iter("body"):
@@ -265,44 +262,9 @@ def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: Rob
             site.set("pos", numbers((path.reach, 0.0, PAYLOAD)))
 
 
-def _stretch(body: Element, path: Guidepath, top: float, hoist: Hoist | None) -> None:
-    """Arm to the rim, finger to the nest, pad up to the payload; with a lift, pin up to the column,
-    which carries the pad."""
-    rim, top = path.reach - path.arm, PAYLOAD + top
-    nest = (max(path.reach + path.nest, rim + 0.01), path.aside * path.left + 0.0)
-    lines = {"arm": ((0.0, 0.0), (rim, 0.0)), "finger": ((rim - 0.01, 0.0), nest)}
-    pin = (FINGER_TOP, top - 1e-3)
-    uprights = {"pad": pin}
-    if hoist is not None:
-        column = (top - 2e-3 - hoist.stroke, top - 2e-3)
-        uprights = {"pin": pin, "column": column, "pad": (top - 2e-3, top)}
-    for geom in body.iter("geom"):
-        name = (geom.get("name") or "").rpartition("/")[2]
-        for kind, ends in lines.items():
-            if name == kind:
-                _span(geom, *ends)
-        for kind, heights in uprights.items():
-            if name == kind:
-                _stand(geom, nest, *heights)
-    for site in body.iter("site"):
-        if (site.get("name") or "").endswith("/nest"):
-            site.set("pos", numbers((*nest, PAYLOAD)))
-
-
-def _stand(geom: Element, at: Point2, low: float, high: float) -> None:
-    """Make an upright cylinder reach from low to high, at least 2 mm."""
-    radius = (geom.get("size") or "0.006").split()[0]
-    geom.set("size", f"{radius} {number(max(high - low, 2e-3) / 2)}")
-    geom.set("pos", numbers((*at, (high + low) / 2)))
-
-
-def _span(geom: Element, start: Point2, end: Point2) -> None:
-    """Make a box reach from start to end."""
+def _span(geom: Element, start: float, end: float) -> None:
+    """Make a box reach ahead from start to end [m]."""
     _, y, z = (float(v) for v in (geom.get("pos") or "0 0 0").split())
-    half = [float(v) for v in (geom.get("size") or "1 1 1").split()]
-    ahead, aside = end[0] - start[0], end[1] - start[1]
-    geom.set("pos", numbers(((start[0] + end[0]) / 2, y + (start[1] + end[1]) / 2, z)))
-    geom.set("size", numbers((hypot(ahead, aside) / 2, half[1], half[2])))
-    if aside:
-        turn = atan2(aside, ahead) / 2
-        geom.set("quat", numbers((cos(turn), 0, 0, sin(turn))))
+    _, wide, high = (float(v) for v in (geom.get("size") or "1 1 1").split())
+    geom.set("pos", numbers(((start + end) / 2, y, z)))
+    geom.set("size", numbers(((end - start) / 2, wide, high)))

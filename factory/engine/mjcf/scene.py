@@ -64,7 +64,7 @@ def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
     fill(statistic, center=tuple(center.tolist()), extent=overview.distance / 1.5)
     _floor_and_light(world, layout)
     for robot, path in enumerate(layout.guidepaths):
-        if not (path.fixed or layout.tile):
+        if path.travels and not layout.tile:
             _rail(world, layout, robot)
     _tiles(world, layout)
 

@@ -17,10 +17,8 @@ from factory.engine.mjcf.driving import (
     HOIST_STIFFNESS,
     STEPS,
     DrivenAxis,
-    along,
+    driven,
     heaviest,
-    lifted,
-    up,
     weights_of,
 )
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
@@ -29,8 +27,7 @@ from factory.engine.mjcf.stops import tray_clearance
 from factory.floor.layout.layout import Layout
 from factory.support.settings import AUTO, TICK, Settings
 from factory.theory.control.profile import World
-from factory.theory.plant.robot import Robot
-from factory.theory.problem.robot_bodies import LIFT_JOINT
+from factory.theory.plant.axes import Axis
 
 USUAL = 5
 """Timesteps of a tick where none is good, or there are no drives: 2 ms."""
@@ -94,14 +91,11 @@ def _dip(settings: Settings, load: float) -> float:
 
 
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
-    """Every robot, lift and the tray with the heaviest that it carries, and the shutter."""
+    """Every axis of robots and the tray with the heaviest that it carries, and the shutter."""
     room, far = layout.clearance, tray_clearance(layout)
-    robots, masses = layout.factory.robots, weights_of(layout)
-    for robot, load in zip(robots, heaviest(layout, masses), strict=True):
-        yield replace(_carried(robot, load, settings), gain=1 - jitter, room=room)
-    for number, load in lifted(layout, masses).items():
-        lift = robots[number].body.axis(LIFT_JOINT)
-        yield replace(up(lift, load, settings), gain=1 - jitter, room=room)
+    masses = weights_of(layout)
+    for axis, load in zip(layout.factory.axes, heaviest(layout, masses), strict=True):
+        yield replace(_carried(axis, load, settings), gain=1 - jitter, room=room)
     fast = settings.outfeed_acceleration
     product = max(masses[label] for label in layout.factory.products)
     yield DrivenAxis.loaded(TRAY_MASS, product, fast, far, jump=CRUISES)
@@ -109,8 +103,8 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
     yield DrivenAxis(SHUTTER_MASS + MOTOR, 0.0, shut, shut + GRAVITY, HOIST_STIFFNESS)
 
 
-def _carried(robot: Robot, load: float, settings: Settings) -> DrivenAxis:
-    """The first axis of a robot; one that is fixed bears its payload as a carriage does."""
-    if robot.fixed:
-        return DrivenAxis.loaded(robot.body.mass, load, settings.acceleration)
-    return along(robot.body.first, load, settings)
+def _carried(axis: Axis, load: float, settings: Settings) -> DrivenAxis:
+    """An axis of a robot with its load; one that turns bears its payload as a carriage does."""
+    if axis.motion.rotary:
+        return DrivenAxis.loaded(axis.robot.body.mass, load, settings.acceleration)
+    return driven(axis.joint, load, settings)

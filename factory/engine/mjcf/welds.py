@@ -27,12 +27,10 @@ def add_welds(
     """Grips, feeders, parking places, and the star that holds a finished product together."""
     factory = layout.factory
     for grip in grips_of(layout, bodies):
-        robot = factory.robots[grip.robot]
-        holder = names.head if grip.robot in factory.strokes else names.carriage
-        holder = names.tool if robot.fixed else holder
-        name, body = names.grip(robot.name, grip.label), names.part(grip.label, 1)
+        axis = factory.outermost(grip.robot)
+        name, body = names.grip(axis.robot.name, grip.label), names.part(grip.label, 1)
         turn = seen_from(layout.guidepaths[grip.robot], grip.fed)
-        _weld(equality, name, holder(robot.name), body, (*grip.position, *turn))
+        _weld(equality, name, names.moved(axis), body, (*grip.position, *turn))
     outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
     for label, outlet in outlets.items():
         path, slider = layout.guidepaths[outlet.robot], hanging.slider[label]

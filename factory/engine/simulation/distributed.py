@@ -124,7 +124,7 @@ class DistributedSupervisor:
         self.stages: dict[tuple[int, int], list[tuple[int, HeadStart]]] = {}
         for number, stage in enumerate(stages, start=count):
             self.stages.setdefault((stage.robot, stage.operation), []).append((number, stage))
-        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
+        axes_of = [*factory.moves, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
         programs = [program_of(factory, robot.index) for robot in factory.robots]
@@ -136,12 +136,11 @@ class DistributedSupervisor:
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
         scans = drawn_scans(self.random, len(programs), self.timestep)
         x = self.world.sense()[0]
-        lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
         processes = []
         for p, scan in zip(programs, scans, strict=True):
-            axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
+            axes = np.array(self.factory.axes_of(p.robot))
             link, still = (
-                Link(p.robot, self.cells, self.world, self.factory.axes),
+                Link(p.robot, self.cells, self.world, self.factory.moves),
                 np.zeros(len(axes)),
             )
             link.at(p.steps[0].operation, 0)
@@ -245,7 +244,7 @@ class DistributedSupervisor:
         """ẋ_i = π_i ∘ F_p, by the robot's own limits at its own rate; its lift's too."""
         dt = process.period * self.timestep
         x = process.link.state()[0]
-        slots, mine = np.nonzero(np.equal.outer(self.factory.axes[operation.index], process.axes))
+        slots, mine = np.nonzero(np.equal.outer(self.factory.moves[operation.index], process.axes))
         x[slots] = process.reference[mine] + process.speed[mine] * dt / 2
         self._drive(process, mine, self._bundle(operation).field(x, dt)[slots])
 

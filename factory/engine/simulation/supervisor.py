@@ -70,7 +70,7 @@ class Supervisor:
     ) -> None:
         self.factory, self.world, self.tick = factory, world, tick
         self.ordering = Ordering()
-        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
+        axes_of = [*factory.moves, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self._mark(start)
         self.fired = [
@@ -232,7 +232,7 @@ class Supervisor:
         going = self.ahead.going(self.active.ahead).values()
         if any(stage.robot in operation.robots for stage in going):
             return False
-        axes = [*self.factory.axes[operation.index]]
+        axes = [*self.factory.moves[operation.index]]
         return bool((np.abs(self.world.sense()[1][axes]) < STILL).all())
 
     def _skip(self, operations: Sequence[Operation]) -> None:

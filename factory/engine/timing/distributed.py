@@ -174,7 +174,7 @@ class ScannedTimes:
         arrivals, opens = dict[int, float](), dict[int, float]()
         ways = dict[int, tuple[int, int, Trajectory]]()
         for slot in mode.order:
-            axis = timing.factory.axes[number][slot]
+            axis = timing.factory.moves[number][slot]
             robot = timing.factory.robot_of(axis)
             begun, goal = self.entered[number, robot], float(mode.goals[slot])
             start = float(starts[slot])

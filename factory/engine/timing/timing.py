@@ -138,42 +138,41 @@ class Timing:
         layout = self.layout
         drive = self.axis_drive(past.axis, change)
         if past.axis != carriage_axis(robot):
-            low, top = self._rise(robot, number)
+            low, top = self._rise(past.axis, number)
             return drive.way(top - low).passes(top - past.at)
         visit, factor = layout.visits[number, robot], change.way.get(robot, 1.0)
         if past.direction < 0:
             slot = self.factory.operations[number].robots.index(robot)
             way = self._trajectories(number, self.starts[number], change)[slot]
             return way.passes(max(0.0, past.at - visit.at) * factor)
-        rises, length = 0, layout.guidepaths[robot].length
-        if rises_first(layout, robot):
-            lift = self.axis_drive(self.factory.lift_axis[robot], change)
-            low, top = self._rise(robot, number)
-            rises = lift.way(top - low).rests(self.settings.eps)
+        rises, length, up = 0, layout.guidepaths[robot].length, self.factory.up(robot)
+        if up is not None and rises_first(layout, robot):
+            low, top = self._rise(up, number)
+            rises = self.axis_drive(up, change).way(top - low).rests(self.settings.eps)
         home = drive.way((length - visit.at) * factor)
         if past.at < length - HOME:
             return rises + home.passes(min(length - visit.at, length - past.at) * factor)
         return rises + home.rests(HOME) + self._adjusted(robot, number)
 
-    def _rise(self, robot: int, number: int) -> tuple[float, float]:
-        """From where an operation (index) leaves the lift of a robot to where the next one takes it
-        [m]: tours differ in both."""
-        lift, after = self.factory.lift_axis[robot], self.factory.after(robot, number)
-        axes, stroke = self.factory.axes, self.layout.strokes[robot]
+    def _rise(self, axis: AxisId, number: int) -> tuple[float, float]:
+        """From where an operation (index) leaves an axis that goes up to where the next one of its
+        robot takes it [m]: tours differ in both."""
+        after = self.factory.after(self.factory.robot_of(axis), number)
+        axes, (_, stroke) = self.factory.moves, self.layout.spans[axis]
         low, top = (
-            float(self.modes[n].goals[axes[n].index(lift)]) if lift in axes[n] else stroke
+            float(self.modes[n].goals[axes[n].index(axis)]) if axis in axes[n] else stroke
             for n in (number, after)
         )
         return low, top
 
     def _adjusted(self, robot: int, number: int) -> int:
         """The ticks in which the lift of a robot that is at home is set for its next tour."""
-        if robot not in self.factory.adjusted:
+        axis = self.factory.up(robot)
+        if axis is None or robot not in self.factory.adjusted:
             return 0
         both = number, self.factory.after(robot, number)
         one, other = (self.layout.visits[n, robot].up for n in both)
-        lift = self.axis_drive(self.factory.lift_axis[robot], AS_IT_IS)
-        return lift.way(abs(one - other)).rests(self.settings.eps)
+        return self.axis_drive(axis, AS_IT_IS).way(abs(one - other)).rests(self.settings.eps)
 
     @cached_property
     def strokes(self) -> Mapping[int, tuple[float, float]]:
@@ -286,7 +285,7 @@ class Timing:
             [self.factory.robots[r].operations[0] == o.index for r in self._of(o.index)]
             for o in self.factory.operations
         ]
-        here = (positions[list(axes)] for axes in self.factory.axes)
+        here = (positions[list(axes)] for axes in self.factory.moves)
         starts = staged([*map(np.where, begins, here, self.left)], self.stages)
         return MappingProxyType(
             {n: self._delay(n, start, AS_IT_IS) for n, start in enumerate(starts) if any(begins[n])}
@@ -295,7 +294,7 @@ class Timing:
     def travel(self, number: int, slot: int) -> float:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
-        axis = self.factory.axes[number][slot]
+        axis = self.factory.moves[number][slot]
         drive = self.axis_drive(axis, AS_IT_IS)
         profile = SpeedProfile(drive.speed, drive.acceleration)
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
@@ -319,7 +318,7 @@ class Timing:
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
-        return tuple(map(self.factory.robot_of, self.factory.axes[number]))
+        return tuple(map(self.factory.robot_of, self.factory.moves[number]))
 
     def _delay(self, number: int, start: Array, change: Change) -> float:
         mode, ways = self.modes[number], self._trajectories(number, start, change)
@@ -328,7 +327,7 @@ class Timing:
     def _trajectories(self, number: int, start: Array, change: Change) -> list[Trajectory]:
         """The references of the axes of an operation from `start`, with a change."""
         mode, robots = self.modes[number], self._of(number)
-        limits = self._limits(self.factory.axes[number], robots, change)
+        limits = self._limits(self.factory.moves[number], robots, change)
         if not change.way.keys().isdisjoint(robots):
             carriages = len(self.factory.operations[number].robots)
             shares = [change.way.get(robot, 1.0) for robot in robots[:carriages]]

@@ -207,7 +207,7 @@ class ClearanceSearch:
         """Whether one is of a fixed robot over a station of the other's: that is below its tool, or
         they are near in space (`exclusions`)."""
         end = delivery(self.layout.factory, one.robot)
-        if not self.layout.factory.robots[one.robot].fixed or end is None:
+        if self.layout.factory.robots[one.robot].travels or end is None:
             return False
         if end.carrier != other.robot:
             return False

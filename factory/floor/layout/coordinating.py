@@ -176,7 +176,7 @@ def _chain(
     gear = factory.robots[robot].operations
     step = (gear.index(operation.index) + 1) % len(gear)
     then, wait = factory.operations[gear[step]], factory.net.gears[robot].waiting(step)
-    goals = dict(zip(factory.axes[then.index], layout.goals(then.index), strict=True))
+    goals = dict(zip(factory.moves[then.index], layout.goals(then.index), strict=True))
     start, events = build.transitions[then.start].name, {*names.values()}
     waits = any(order.start == start and order.before in events for order in orders)
     beyond = not waits and all(p.axis in goals and p.holds(goals[p.axis]) for p in passes)

@@ -59,7 +59,7 @@ def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     elif not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
         message = f"{name}: its guidepath, {ends[2:4]} to {ends[4:]}, is not in whole millimetres"
         yield fault(factory, message, robot)
-    elif not (path.fixed or (path.travel > 0 and path.reach > 0)):
+    elif path.travels and not (path.travel > 0 and path.reach > 0):
         message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
         yield fault(factory, message, robot)
     stops = layout.stops(robot) or [0.0]

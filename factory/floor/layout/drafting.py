@@ -95,7 +95,7 @@ class LayoutDraft:
 
     def _turn(self, robot: int) -> float | None:
         """The angle by which a fixed robot turns its payload into place [rad]."""
-        if not self.factory.robots[robot].fixed:
+        if self.factory.robots[robot].travels:
             return None
         label, *_ = self.factory.deliveries(robot)  # the same for each unit of a period
         return -fed_of(self.product, self.factory.contents[label]) + 0.0

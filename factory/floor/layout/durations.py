@@ -141,7 +141,7 @@ def _operation_time(
         stroke = visit.up - visit.lift
         longest = max(longest, pace.entered(rested[lowered]) + pace.rest(stroke))
     for robot in operation.robots:
-        lifted = robot in layout.factory.strokes
+        lifted = layout.factory.goes_up(robot)
         if lifted and layout.factory.begins(robot, operation.index):
-            longest = max(longest, pace.rest(layout.strokes[robot]))
+            longest = max(longest, pace.rest(layout.rise(robot)))
     return longest + operation.dwell + pace.lost

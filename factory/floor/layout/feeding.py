@@ -78,7 +78,7 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     visit = layout.visits[operation.index, robot]
     middle, elevation = path.middle(visit.at), visit.elevation
     solids = [layout.product.solids[part] for part in shown]
-    first, rises = layout.factory.robots[robot].operations[0], layout.strokes.get(robot, 0.0)
+    first, rises = layout.factory.robots[robot].operations[0], layout.rise(robot)
     highest = max(
         float(solid.high[2]) + (layout.visits[by_label[part].index, robot].elevation - elevation)
         for part, solid in zip(shown, solids, strict=True)

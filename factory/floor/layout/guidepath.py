@@ -16,6 +16,7 @@ import numpy as np
 
 from factory.floor.layout.way import Bend, way_of
 from factory.support.arrays import Array
+from factory.theory.problem.robot_bodies import MOTIONS, TURN_JOINT
 
 Box = tuple[float, float, float, float]
 """(xlo, xhi, ylo, yhi) [m]."""
@@ -25,9 +26,6 @@ Extent = tuple[float, float, float, float]
 
 Point2 = tuple[float, float]
 """A point or a vector in the plane of the floor [m]."""
-
-LEVER = 0.1
-"""At the end of an arm of this length [m] what turns is as fast as other robots are."""
 
 
 def project(box: Box, u: Point2, t: Point2) -> Extent:
@@ -87,14 +85,14 @@ class Guidepath:
     turn: float | None = None
 
     @property
-    def fixed(self) -> bool:
-        """Whether the robot stands at its station, and turns."""
-        return self.turn is not None
+    def travels(self) -> bool:
+        """Whether the robot goes along it; else it stands at its station, and turns."""
+        return self.turn is None
 
     @property
     def lever(self) -> float:
-        """How far [m] the robot goes along for each unit of x: 1, or LEVER where x is an angle."""
-        return LEVER if self.fixed else 1.0
+        """Distance [m] that the robot goes for a unit of x: 1, but where x is an angle."""
+        return 1.0 if self.travels else MOTIONS[TURN_JOINT].lever
 
     @property
     def length(self) -> float:
@@ -133,7 +131,7 @@ class Guidepath:
         if self.bends:
             back, across = self._bent(x)
             return self._placed(back - self.reach, across)
-        back = 0.0 if self.fixed else x - self.reach
+        back = x - self.reach if self.travels else 0.0
         return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
 
     def carriage(self, x: float) -> Point2:
@@ -141,7 +139,7 @@ class Guidepath:
         if self.bends:
             back, across = self._bent(x)
             return self._placed(back, across + self.offset)
-        x = self.reach if self.fixed else x
+        x = x if self.travels else self.reach
         return (
             self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
             self.a[1] - self.heading[1] * x + self.side[1] * self.offset,

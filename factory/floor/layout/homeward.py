@@ -69,7 +69,7 @@ class Homeward(Nearness):
             return judged(*self._on_stem(there, other), layout.clearance) is None
 
         short, far = begin, home - SPARE
-        if layout.guidepaths[robot].fixed or begin >= home or not clear(far) or clear(short):
+        if not layout.guidepaths[robot].travels or begin >= home or not clear(far) or clear(short):
             return None
         for _ in range(BISECTIONS):
             middle = (short + far) / 2

@@ -89,8 +89,7 @@ class Layout(Keeping, Pictured):
         first = self.factory.robots[robot].operations[0]
         over = PAYLOAD - float(self.product.low[2]) + self.visits[first, robot].height
         lies = path.heading, path.side, path.reach, path.arm, path.offset
-        stroke = self.strokes.get(robot)
-        return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
+        return Mount(*lies, (x, y), over, self.rise(robot), self.factory.goes_up(robot))
 
     def grip(self, robot: int) -> Extent | None:
         """The box about the product's middle, in a robot's frame (u, t), that its hand and mast
@@ -101,11 +100,11 @@ class Layout(Keeping, Pictured):
     @cached_property
     def guidepath_length(self) -> float:
         """Total length of the guidepaths [m]; fixed robots have none."""
-        return float(sum(g.length for g in self.guidepaths if not g.fixed))
+        return float(sum(g.length for g in self.guidepaths if g.travels))
 
     @cached_property
-    def bent(self) -> tuple[tuple[int, ...], Ways]:
-        """The robots (index) with bent guidepaths, and their ways."""
+    def curves(self) -> tuple[tuple[int, ...], Ways]:
+        """The robots (index) whose guidepaths have bends, and the curves that these are."""
         robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
         paths = [self.guidepaths[robot] for robot in robots]
         return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
@@ -130,7 +129,7 @@ class Layout(Keeping, Pictured):
 
     def goals(self, operation: int) -> tuple[float, ...]:
         """Positions of an operation's axes at its end: arc lengths of carriages, heights of lifts
-        [m], in the order of `Factory.axes`."""
+        [m], in the order of `Factory.moves`."""
         return self._on_axes(operation, 1)
 
     def starts(self, operation: int) -> tuple[float, ...]:
@@ -142,7 +141,7 @@ class Layout(Keeping, Pictured):
         factory, carriages = self.factory, len(self.factory.robots)
         visits = (
             (axis < carriages, self.ways[operation, factory.robot_of(axis)][end])
-            for axis in factory.axes[operation]
+            for axis in factory.moves[operation]
         )
         return tuple(visit.at if is_carriage else visit.lift for is_carriage, visit in visits)
 
@@ -178,15 +177,25 @@ class Layout(Keeping, Pictured):
         return MappingProxyType(ways)
 
     @cached_property
-    def strokes(self) -> Mapping[int, float]:
-        """Stroke of each robot's lift (index), in the order of their axes [m]."""
-        programs = {robot: self.factory.robots[robot].operations for robot in self.factory.strokes}
-        return MappingProxyType(
-            {
-                robot: max((LEAST, *(self.visits[number, robot].up for number in program)))
-                for robot, program in programs.items()
-            }
-        )
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        """The least and the greatest coordinate of each axis, in the order of `Factory.axes` [m;
+        rad where it turns]."""
+        count = len(self.guidepaths)
+        along = (self.ends(robot) for robot in range(count))
+        up = ((0.0, self.rise(axis.robot.index)) for axis in self.factory.axes[count:])
+        return (*along, *up)
+
+    def rise(self, robot: int) -> float:
+        """How far a robot (index) goes up at most [m]; 0 where it stays at its height."""
+        return self._rises.get(robot, 0.0)
+
+    @cached_property
+    def _rises(self) -> Mapping[int, float]:
+        up = (robot for robot in self.factory.robots if self.factory.goes_up(robot.index))
+        return {
+            robot.index: max((LEAST, *(self.visits[o, robot.index].up for o in robot.operations)))
+            for robot in up
+        }
 
     def side(self, operation: Operation) -> int:
         """From which side, +1 or -1, of the axis of its approach the last input of an operation
@@ -234,7 +243,7 @@ class Layout(Keeping, Pictured):
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
         path = self.guidepaths[operation.robots[slot]]
-        if slot == operation.lowered and path.fixed:
+        if slot == operation.lowered and not path.travels:
             return min(BESIDE, path.travel)
         if slot == operation.lowered:
             return max(BESIDE, self._beside_hand(operation, slot) if pile == NOPART else 0.0)
@@ -253,7 +262,7 @@ class Layout(Keeping, Pictured):
         must be there first [m]; else 0."""
         hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
-        if hand is None or grip is None or on.fixed or not hand.first:
+        if hand is None or grip is None or not on.travels or not hand.first:
             return 0.0
         x, y = self.visits[operation.index, operation.carrier].shift
         over = x * path.heading[0] + y * path.heading[1]
@@ -324,7 +333,7 @@ def delivery(factory: Factory, robot: int) -> Operation:
     fixed robot which takes what it brings."""
     while True:
         last = factory.last(robot)
-        if last.carrier == robot or not factory.robots[last.carrier].fixed:
+        if last.carrier == robot or factory.robots[last.carrier].travels:
             return last
         robot = last.carrier
 

@@ -160,7 +160,7 @@ class Packing:
         outline, strip = self.outline(robot, side), self.own.strips[side]
         early = self.own.early(stop, side, outline.shape)
         wanted = up(outline.least + early) if early > 0 else 0.0
-        if outline.shape.fixed:
+        if not outline.shape.travels:
             return [Guest(robot, outline, side, 0.0)]
         near = Guest(robot, outline, side, max(outline.clear(strip), wanted), wanted)
         if outline.crown == -inf:
@@ -286,7 +286,7 @@ class Packing:
         for guest in way.guests:
             outline = guest.outline
             clear = outline.clear(strip(guest.side, guest.station + outline.high[PAYLOADS]))
-            least = 0.0 if outline.shape.fixed else max(clear, guest.wanted)
+            least = max(clear, guest.wanted) if outline.shape.travels else 0.0
             guests.append(_came(beside, guest, guest.station, least))
             if guests[-1].travel == inf:
                 return None
@@ -336,7 +336,7 @@ def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: fl
     """A robot at a station beside what is there already, with at least a given travel; not
     elsewhere if it is fixed."""
     travel = beside[guest.side].travel(guest.outline, station, least)
-    if guest.outline.shape.fixed and travel > least:
+    if not guest.outline.shape.travels and travel > least:
         travel = inf
     return replace(guest, station=station, travel=travel)
 

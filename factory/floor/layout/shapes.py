@@ -42,7 +42,7 @@ class Shape:
     where none is chosen, and the box `grip` of what of that is among the payloads; how far to the
     side the `post` of its feeder stands [m]; by operation how far the product's middle is ahead, to
     the side and above where the robot has it on its first tour (`shifts`), nothing where it is
-    always there: boxes are about the latter; whether it is `fixed` at its station."""
+    always there: boxes are about the latter; whether it `travels` along a guidepath."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -57,7 +57,7 @@ class Shape:
     post: float = 0.0
     least: float = 0.0
     shifts: Mapping[int, Point3] = field(default_factory=dict)
-    fixed: bool = False
+    travels: bool = True
 
     def shift(self, operation: int) -> Point3:
         """Displacement of the product's middle, ahead, to the side and above, from where the
@@ -248,9 +248,9 @@ def held_shape(
     least = max(least, hands.travels.get(robot, 0.0))
     over = PAYLOAD - float(hands.holding.product.low[2])
     grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
-    fixed = factory.robots[robot].fixed
+    travels = factory.robots[robot].travels
     least, extents = up(least), (offset, arm, reach, nest, False, spread)
-    return Shape(boxes, last, *extents, hand, grip, post, least, shifts, fixed)
+    return Shape(boxes, last, *extents, hand, grip, post, least, shifts, travels)
 
 
 def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point3], float]:

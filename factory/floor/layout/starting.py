@@ -14,12 +14,12 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     waits without a payload at the beginning of its cycle; then its lift is where its last tour left
     it, unless it is adjusted by then or its hand is above what it takes."""
     factory, net = layout.factory, layout.factory.net
-    positions, lifts = np.zeros(len(factory.robots) + len(layout.strokes)), factory.lift_axis
+    positions = np.zeros(len(factory.axes))
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         step, _ = gear.step_in(marking)
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
         always = robot.index in factory.adjusted or rises_first(layout, robot.index)
-        if robot.index in lifts:
+        if (up := factory.up(robot.index)) is not None:
             before, visit = layout.ways[robot.operations[step], robot.index]
-            positions[lifts[robot.index]] = visit.up if step or always else before.lift
+            positions[up] = visit.up if step or always else before.lift
     return positions

@@ -232,8 +232,9 @@ class Staying:
 
     def _chains(self, after: int, robot: int) -> tuple[Chain, Chain]:
         """The passes of a robot's carriage that follow a transition, and of its lift."""
-        lift, chains = self.layout.factory.lift_axis.get(robot, -1), self._by_axis
-        return chains.get((after, robot), NO_PASS), chains.get((after, lift), NO_PASS)
+        up, chains = self.layout.factory.up(robot), self._by_axis
+        lift = NO_PASS if up is None else chains.get((after, up), NO_PASS)
+        return chains.get((after, robot), NO_PASS), lift
 
     @cached_property
     def _by_axis(self) -> Mapping[tuple[int, int], Chain]:
@@ -313,7 +314,7 @@ def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
     """How a robot moves with its arc length: against its heading, along its bent guidepath, or not
     at all if it turns."""
     path = layout.guidepaths[robot]
-    ahead = 0.0 if path.fixed else -1.0
+    ahead = -1.0 if path.travels else 0.0
     return np.array([*path.heading, 0.0]) * ahead, path if path.bends else None
 
 

@@ -118,12 +118,12 @@ def guests_of(factory: Factory, operation: Operation) -> tuple[int, ...]:
     carrier, and those that bring something to one of these that is fixed. Raises InputError
     (Layout) where the layout cannot have them: two guidepaths can end at one point of a third, one
     from each side; a third cannot."""
-    if factory.robots[operation.carrier].fixed:
+    if not factory.robots[operation.carrier].travels:
         return ()
     guests = [robot for robot in operation.robots if robot != operation.carrier]
     goals = operation.template.law.goals
     away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
-    for guest in [robot for robot in guests if factory.robots[robot].fixed]:
+    for guest in [robot for robot in guests if not factory.robots[robot].travels]:
         gear = (factory.operations[number] for number in factory.robots[guest].operations)
         bringing = (r for o in gear if o.carrier == guest for r in o.robots if r != guest)
         guests += dict.fromkeys(bringing)

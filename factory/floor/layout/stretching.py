@@ -103,7 +103,7 @@ class _Builder:
         for robot, station in self.guests:
             outline, side = self.outlines[robot], self.sides[robot]
             travel = outline.clear(strip(side, station + outline.high[PAYLOADS]))
-            if outline.shape.fixed:
+            if not outline.shape.travels:
                 travel = 0.0
             guests.append(Guest(robot, outline, side, travel, station=station))
         return guests

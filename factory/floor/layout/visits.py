@@ -126,8 +126,8 @@ def _levels(
         below = [0.0] * len(ends)
         if robot:
             below = [elevations[o.carrier][factory.turns[o.index, o.carrier]] for o in ends]
-        stroke, downs = factory.strokes.get(robot, 0.0), [0.0] * len(ends)
-        if robot in factory.strokes and len(ends) > 1 and shifts:
+        stroke, downs = factory.lowering(robot), [0.0] * len(ends)
+        if factory.goes_up(robot) and len(ends) > 1 and shifts:
             over = [d - z for d, (_, _, z) in zip(below, shifts[robot], strict=True)]
             downs = [round(at - min(over), 6) for at in over]
             needed = (o.approach.stroke if o.approach else 0.0 for o in ends)

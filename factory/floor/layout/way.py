@@ -47,7 +47,7 @@ class Ways:
         ends: coordinates of the ends of pieces, from -FAR to FAR, padded with FAR for ways with
             fewer pieces (n, 2c + 2).
         middle: where straight pieces begin, and the corners of round ones (n, 2c + 1).
-        terms: place, first and second derivative there (n, 2c + 1, 3, 2).
+        terms: place, first and second derivative there (n, 2c + 1, 3, d).
         rounding: (n,) [m].
     """
 
@@ -55,6 +55,11 @@ class Ways:
     middle: Array
     terms: Array
     rounding: Array
+
+    @property
+    def dimension(self) -> int:
+        """d: that of the space that they are in."""
+        return int(self.terms.shape[-1])
 
     @classmethod
     def of(cls, bends: Sequence[Sequence[Bend]], rounding: Sequence[float]) -> Ways:

@@ -39,9 +39,9 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     operations = layout.factory.operations
     modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
     starts = operation_starts(layout)
-    count = len(layout.guidepaths) + len(layout.strokes)
+    count = len(layout.factory.axes)
     limits = Limits(np.ones(count), np.ones(count))
-    bundle = Bundle.of(modes, [limits.of(axes) for axes in layout.factory.axes])
+    bundle = Bundle.of(modes, [limits.of(axes) for axes in layout.factory.moves])
     inside = bundle.in_domain(np.concatenate(starts))
     faults = [
         _unprepared(operation, within)
@@ -123,7 +123,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     template, end = operation.template, np.array([path.length for path in paths])
     if template.before[carrier] != NOPART or not isclose(station, end[carrier], abs_tol=1e-9):
         template, end[carrier] = _inside(template), ends[carrier]
-    if any(path.fixed for path in paths):
+    if not all(path.travels for path in paths):
         template = replace(template, identifications=())  # no guidepath of another meets its axis
     setting = Setting(
         lower=np.array([layout.stop_offset(operation.index, s)[0] for s in range(len(paths))]),
@@ -149,11 +149,11 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     """The mode with the lifts that its robots raise, or lower: one that is lowered is up until its
     own robot stands, which stands after all others."""
     factory, count = layout.factory, len(operation.robots)
-    axes = factory.axes[operation.index][count:]
+    axes = factory.moves[operation.index][count:]
     if not axes:
         return mode
     robots = [*map(factory.robot_of, axes)]
-    strokes = np.array([layout.strokes[robot] for robot in robots])
+    strokes = np.array([layout.rise(robot) for robot in robots])
     goals = np.array(layout.goals(operation.index)[count:])
     ups = np.array([layout.visits[operation.index, robot].up for robot in robots])
     lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < ups)
@@ -172,7 +172,7 @@ def _gate(layout: Layout, operation: Operation, robot: int) -> int:
     """The slot of what has to stand before a robot lowers its lift: itself, which stands after all
     others; the carrier, for one that is fixed and need not turn."""
     path = layout.guidepaths[robot]
-    alone = path.fixed and not path.travel
+    alone = not path.travels and not path.travel
     return operation.template.carrier - 1 if alone else operation.robots.index(robot)
 
 
@@ -200,9 +200,9 @@ def robot_limits(
     end of its lever; round a corner no carriage is too fast for its acceleration."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
-    robots = [*range(count), *layout.strokes]
-    levers = np.array([path.lever for path in layout.guidepaths] + [1.0] * len(layout.strokes))
+    robots = [axis.robot.index for axis in layout.factory.axes]
+    levers = np.array([axis.motion.lever for axis in layout.factory.axes])
     speed = settings.speed * draw[0, robots] / levers
-    for robot in layout.bent[0]:
+    for robot in layout.curves[0]:
         speed[robot] = layout.guidepaths[robot].fastest(speed[robot], settings.acceleration)
     return Limits(speed, settings.acceleration / levers), draw[1, robots]

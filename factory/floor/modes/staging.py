@@ -97,10 +97,10 @@ def _rising(
     """The way up of a lift before the first operation of its robot, and after that the way back
     from its `start` to where the robot is `awaited`, if it is."""
     factory, robot = layout.factory, operation.robots[slot]
-    if not factory.begins(robot, operation.index):
+    axis = factory.up(robot)
+    if axis is None or not factory.begins(robot, operation.index):
         return
-    axis = factory.lift_axis[robot]
-    goal = float(mode.goals[factory.axes[operation.index].index(axis)])
+    goal = float(mode.goals[factory.moves[operation.index].index(axis)])
     yield _ahead(factory, operation, mode, axis, goal, 0.0)
     if awaited is not None and abs(start - awaited) > ROUNDING:
         yield replace(
@@ -113,10 +113,10 @@ def _adjusting(
 ) -> Iterator[HeadStart]:
     """The way of a lift to where it is for the next tour, once its robot is at home."""
     factory = layout.factory
-    if robot not in factory.adjusted or not factory.begins(robot, operation.index):
+    axis = factory.up(robot) if robot in factory.adjusted else None
+    if axis is None or not factory.begins(robot, operation.index):
         return
-    axis = factory.lift_axis[robot]
-    raised = factory.axes[operation.index].index(axis)
+    raised = factory.moves[operation.index].index(axis)
     goal, at = float(mode.goals[raised]), float(start[raised])
     if abs(goal - at) > ROUNDING:
         yield replace(_ahead(factory, operation, mode, axis, goal, at), follows=True)
@@ -125,7 +125,7 @@ def _adjusting(
 def _ahead(
     factory: Factory, operation: Operation, mode: Mode, axis: AxisId, goal: float, start: float
 ) -> HeadStart:
-    slot = factory.axes[operation.index].index(axis)
+    slot = factory.moves[operation.index].index(axis)
     only = slice(slot, slot + 1)
     alone = Mode(np.array([goal]), mode.lower[only], mode.upper[only], mode.eps)
     return HeadStart(factory.robot_of(axis), operation.index, slot, alone, start, axis)

@@ -57,7 +57,7 @@ def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> It
     """Operations to which a fixed robot brings what slides, or is blocked."""
     for o in operations:
         for robot, label in zip(o.robots, o.before, strict=True):
-            if not robots[robot].fixed or label == NOPART or o.approach is None:
+            if robots[robot].travels or label == NOPART or o.approach is None:
                 continue
             if label != o.approach.lowered:
                 message = f"'{label}' cannot be lowered in '{o.label}', as {o.template.name} does"
@@ -68,7 +68,7 @@ def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> It
 def check_shapes(factory: Factory, shaped: bool) -> None:
     """Raises InputError (Blocked) where a product whose parts are not `shaped` has fixed robots: of
     default boxes it is not known what can be lowered."""
-    fixed = [robot for robot in factory.robots if robot.fixed and not shaped]
+    fixed = [robot for robot in factory.robots if not robot.travels and not shaped]
     if fixed:
         labels = (factory.deliveries(robot.index)[0] for robot in fixed)
         hint = "give parts shapes: box = ( 0.04, 0.02, 0.03 ), pos = ( 0, 0, 0.037 )"
@@ -85,6 +85,6 @@ def placed(nodes: Mapping[str, Node], catalogue: Catalogue) -> dict[str, str]:
         of = node.template
         for variable, taken in zip(of.inputs, node.inputs, strict=True):
             wanted = catalogue.types.get(of.robots[of.before.index(variable)])
-            if wanted is not None and wanted.fixed:
+            if wanted is not None and not wanted.travels:
                 inputs[label] = taken
     return inputs

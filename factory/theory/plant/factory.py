@@ -14,6 +14,7 @@ from types import MappingProxyType
 from factory.support.showing import Pictured
 from factory.theory.nets.gears import GearNet, ascending
 from factory.theory.nets.undone import Joins
+from factory.theory.plant.axes import Axis
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import (
@@ -24,6 +25,7 @@ from factory.theory.problem.ids import (
 )
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import Plan, out_of_turn
+from factory.theory.problem.robot_bodies import LIFT_JOINT, MOTIONS
 
 NO_PARENT = OperationId(-1)
 """The operation that takes what a dropoff makes: none."""
@@ -168,24 +170,33 @@ class Factory(Pictured):
         return tuple(when)
 
     @cached_property
-    def strokes(self) -> Mapping[int, float]:
-        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
-        with several tours the farthest that one of them asks for, one that is adjusted 0."""
-        strokes: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
+    def _lowered(self) -> Mapping[int, float]:
+        """How far [m] each robot (index) that goes up and down lowers what it delivers, robot by
+        robot: one with several tours the farthest that one of them asks for, one that is adjusted
+        0."""
+        lowered: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
         for o in self.operations:
             if o.approach is not None and o.lowered >= 0:
                 robot = o.robots[o.lowered]
-                strokes[robot] = max(strokes.get(robot, 0.0), o.approach.stroke)
-        return MappingProxyType(dict(sorted(strokes.items())))
+                lowered[robot] = max(lowered.get(robot, 0.0), o.approach.stroke)
+        return MappingProxyType(dict(sorted(lowered.items())))
 
     @cached_property
-    def axes(self) -> tuple[tuple[AxisId, ...], ...]:
-        """For each operation the axes that its mode moves: the carriages of its robots, which have
-        their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
-        the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
-        adjusted stays where it is on a tour."""
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes: the first one of each robot, which has the robot's number, then those that go
+        up, of robots that need one."""
+        joints = [(robot, robot.body.first) for robot in self.robots]
+        robots = (self.robots[number] for number in self._lowered)
+        joints += [(robot, robot.body.axis(LIFT_JOINT)) for robot in robots]
+        return tuple(Axis(AxisId(n), *joint) for n, joint in enumerate(joints))
+
+    @cached_property
+    def moves(self) -> tuple[tuple[AxisId, ...], ...]:
+        """For each operation the axes that its mode moves: the first ones of its robots, and those
+        by which robots go up or down in it. A robot is up but for the operations that it delivers
+        to; one that is adjusted stays where it is on a tour."""
         moved = [[*map(AxisId, operation.robots)] for operation in self.operations]
-        for robot, axis in self.lift_axis.items():
+        for robot, axis in self._up.items():
             for tour in self.tours[robot]:
                 ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
                 for number in dict.fromkeys(ends):
@@ -193,18 +204,43 @@ class Factory(Pictured):
         return tuple(map(tuple, moved))
 
     @cached_property
-    def lift_axis(self) -> Mapping[int, AxisId]:
-        """The axis of the lift of each robot (index) that has one."""
-        return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self.strokes)}
+    def _up(self) -> Mapping[int, AxisId]:
+        return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self._lowered)}
+
+    def up(self, robot: int) -> AxisId | None:
+        """The axis by which a robot (index) goes up and down; None where it stays at its
+        height."""
+        return self._up.get(robot)
+
+    def goes_up(self, robot: int) -> bool:
+        """Whether a robot (index) goes up and down."""
+        return robot in self._up
+
+    def lowering(self, robot: int) -> float:
+        """How far a robot (index) lowers what it delivers, at most [m]."""
+        return self._lowered.get(robot, 0.0)
+
+    def axes_of(self, robot: int) -> list[AxisId]:
+        """The axes of a robot (index)."""
+        return [AxisId(robot), *([self._up[robot]] if robot in self._up else [])]
+
+    def outermost(self, robot: int) -> Axis:
+        """The axis of a robot (index) whose body holds what it brings: the last of the joints from
+        its carriage up that it uses."""
+        joints = [*MOTIONS]
+        return max(
+            (self.axes[axis] for axis in self.axes_of(robot)),
+            key=lambda axis: joints.index(axis.joint.joint),
+        )
 
     def robot_of(self, axis: int) -> RobotId:
-        """The robot (index) of an axis: of its carriage, or of its lift."""
+        """The robot (index) of an axis."""
         count = len(self.robots)
-        return RobotId(axis) if axis < count else RobotId([*self.strokes][axis - count])
+        return RobotId(axis) if axis < count else RobotId([*self._lowered][axis - count])
 
     def lowers(self, robot: int) -> bool:
         """Whether a robot (index) lowers what it delivers."""
-        return robot in self.strokes and robot not in self.adjusted
+        return robot in self._lowered and robot not in self.adjusted
 
     def first(self, robot: int) -> Operation:
         """The first operation of a robot's program."""

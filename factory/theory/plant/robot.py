@@ -39,7 +39,7 @@ class Robot:
         return self.kind.body
 
     @property
-    def fixed(self) -> bool:
-        """Whether it stands at the station of the robot that it delivers to; its first axis turns
-        what it holds about the vertical."""
-        return self.kind.fixed
+    def travels(self) -> bool:
+        """Whether it goes along a guidepath; else it stands at the station of the robot that it
+        delivers to, and its first axis turns what it holds about the vertical."""
+        return self.kind.travels

@@ -28,8 +28,39 @@ FRICTION = 0.2
 SLIDE, LIFT_JOINT, TURN_JOINT = "slide", "lift", "turn"
 """The joints of robots: along a guidepath, up, and about the vertical."""
 
-MOVES = {SLIDE: "along", LIFT_JOINT: "up", TURN_JOINT: "turn"}
-"""How a robot moves by each joint."""
+
+@dataclass(frozen=True, slots=True)
+class JointMotion:
+    """How a joint moves a robot and what it carries.
+
+    Attributes:
+        word: `along` a guidepath, `up`, or `turn` about the vertical.
+        body: the body with the joint, in the MJCF of a robot type.
+        direction: the axis of the joint there (3,).
+        drive: name of the actuator.
+        rotary: whether the coordinate is an angle [rad]; else it is a length [m].
+        hangs: whether the drive bears the weight of what moves; else a guide or a bearing does.
+        rolls: whether the weight of a load adds to the friction.
+        lever: distance that the robot goes for a unit of the coordinate [m].
+    """
+
+    word: str
+    body: str
+    direction: tuple[float, float, float]
+    drive: str
+    rotary: bool = False
+    hangs: bool = False
+    rolls: bool = False
+    lever: float = 1.0
+
+
+MOTIONS = {
+    SLIDE: JointMotion("along", "carriage", (-1.0, 0.0, 0.0), "drive", rolls=True),
+    LIFT_JOINT: JointMotion("up", "head", (0.0, 0.0, 1.0), "hoist", hangs=True),
+    TURN_JOINT: JointMotion("turn", "tool", (0.0, 0.0, 1.0), "drive", rotary=True, lever=0.1),
+}
+"""How a robot moves by each joint, from the carriage up. At the end of an arm of 0.1 m, what turns
+is as fast as other robots are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +85,11 @@ class RobotAxis:
     kv: float | None = None
     force: float = inf
     position: Position | None = field(default=None, compare=False, repr=False)
+
+    @property
+    def motion(self) -> JointMotion:
+        """How it moves."""
+        return MOTIONS[self.joint]
 
     @property
     def usual(self) -> bool:
@@ -82,9 +118,14 @@ class RobotBody:
     @property
     def first(self) -> RobotAxis:
         """The axis along its guidepath; of a robot that stands, the one that turns."""
-        return self.axes[-1] if self.axes[0].joint != SLIDE else self.axes[0]
+        return self.axes[0] if self.travels else self.axes[-1]
 
     @property
-    def moves(self) -> tuple[str, ...]:
+    def travels(self) -> bool:
+        """Whether it goes along a guidepath; else it stands where it works."""
+        return self.axes[0].joint == SLIDE
+
+    @property
+    def motions(self) -> tuple[str, ...]:
         """What its axes do: go `along` a guidepath, `up`, or `turn` about the vertical."""
-        return tuple(MOVES[axis.joint] for axis in self.axes)
+        return tuple(axis.motion.word for axis in self.axes)

@@ -20,10 +20,9 @@ from factory.theory.problem.robot_bodies import (
     ARM_WIDTH,
     CARRIAGE,
     CARRIAGE_TOP,
-    LIFT_JOINT,
     MAST,
+    MOTIONS,
     SLIDE,
-    TURN_JOINT,
     RobotAxis,
     RobotBody,
 )
@@ -296,7 +295,7 @@ class _Reader:
         if self.nests != [(holder, "nest")]:
             sites = ", ".join(f"'{name}' in '{body}'" for body, name in self.nests) or "none"
             self._wrong(carriage, f"its sites are {sites}", f"one, 'nest' in '{holder}'")
-        names = {SLIDE: "drive", LIFT_JOINT: "hoist", TURN_JOINT: "drive"}
+        names = {joint: MOTIONS[joint].drive for joint in joints}
         driven = {(d.attributes.get("name"), d.attributes.get("joint")): d for d in drives}
         if len(drives) != len(joints) or driven.keys() != {(names[j], j) for j in joints}:
             words = ", ".join(f"'{name}' of '{joint}'" for name, joint in driven) or "none"

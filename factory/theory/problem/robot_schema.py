@@ -7,12 +7,11 @@ import re
 from collections.abc import Container, Iterator, Mapping
 
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.problem.robot_bodies import LIFT_JOINT, SLIDE, TURN_JOINT
+from factory.theory.problem.robot_bodies import LIFT_JOINT, MOTIONS, SLIDE, TURN_JOINT
 
 JOINTS = {
-    SLIDE: ("carriage", "slide", (-1.0, 0.0, 0.0)),
-    LIFT_JOINT: ("head", "slide", (0.0, 0.0, 1.0)),
-    TURN_JOINT: ("tool", "hinge", (0.0, 0.0, 1.0)),
+    joint: (motion.body, "hinge" if motion.rotary else "slide", motion.direction)
+    for joint, motion in MOTIONS.items()
 }
 """Each joint that a robot may have: its body, type and axis."""
 

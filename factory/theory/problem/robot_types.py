@@ -33,19 +33,20 @@ class RobotType:
     summary: str = ""
 
     @property
-    def fixed(self) -> bool:
-        """Whether it stands at its station, and turns what it holds."""
-        return "along" not in self.body.moves
+    def travels(self) -> bool:
+        """Whether it goes along a guidepath; else it stands at its station, and turns what it
+        holds."""
+        return self.body.travels
 
     @property
     def turns(self) -> bool:
         """Whether it turns what it holds about the vertical."""
-        return "turn" in self.body.moves
+        return "turn" in self.body.motions
 
     @property
     def lowers(self) -> bool:
         """Whether it lowers what it delivers."""
-        return "up" in self.body.moves
+        return "up" in self.body.motions
 
 
 @dataclass(frozen=True)
@@ -134,8 +135,8 @@ def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]
             raise InputError(_trouble(path, f"'{robot.name}' extends itself"))
         current = types[current.extends]
         seen.add(current.name)
-        lacking = [move for move in current.body.moves if move not in robot.body.moves]
-        if lacking or current.fixed != robot.fixed:
+        lacking = [word for word in current.body.motions if word not in robot.body.motions]
+        if lacking or current.travels != robot.travels:
             message = f"'{robot.name}' extends '{current.name}' and cannot do as that does"
             hint = f"valid: an MJCF with all joints of {current.mjcf.name}"
             raise InputError(Diagnostic("BadRobot", message, Position(str(robot.mjcf), 1, 1), hint))

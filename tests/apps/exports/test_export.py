@@ -417,7 +417,7 @@ def test_gates_are_kept() -> None:
     """What must wait for another axis stays short of its goal until that one stands."""
     chosen, text = project(LAMP), made("st", LAMP)
     gates = 0
-    for mode, axes in zip(operation_modes(chosen.layout, 2e-4), chosen.factory.axes, strict=True):
+    for mode, axes in zip(operation_modes(chosen.layout, 2e-4), chosen.factory.moves, strict=True):
         for slot, gate in enumerate(mode.gate):
             if gate >= 0:
                 gates += 1

@@ -230,7 +230,8 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
     not."""
     layout = read(ROOT / "examples" / "truck.pag").layout
     robot = layout.factory.by_label["roof"].carrier
-    lift = len(layout.guidepaths) + [*layout.strokes].index(robot)
+    lift = layout.factory.up(robot)
+    assert lift is not None
     for is_kept in (True, False):
         if not is_kept:
             monkeypatch.setattr(Feeders, "_obstructed", lambda feeders: [])
@@ -239,7 +240,7 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
 
         def lose(_: State, made: Simulation = simulation, by: Recovery = recovery) -> None:
             if not by.found and made.supervisor.fired[layout.factory.dropoff.start] == 1:
-                made.physical.motion.put({robot: 0.144, lift: layout.strokes[robot]})
+                made.physical.motion.put({robot: 0.144, lift: layout.rise(robot)})
                 by.plant.lose(0)
 
         run = simulation.run([lose], max_time=120.0)

@@ -85,7 +85,7 @@ def _operations(factory: Factory) -> Iterator[str]:
 
 def _types(layout: Layout) -> Iterator[iec.DataType]:
     factory = layout.factory
-    robots, axes = len(factory.robots), len(layout.guidepaths) + len(layout.strokes)
+    robots, axes = len(factory.robots), len(factory.axes)
     outfeed = max(stations(factory).values())
     yield iec.Structure(
         "CELL",
@@ -118,9 +118,10 @@ def _types(layout: Layout) -> Iterator[iec.DataType]:
 
 
 def _order(layout: Layout) -> str:
-    robots = layout.factory.robots
-    tools = (f"[{r.index + 1}] the tool of {r.name}, an angle" for r in robots if r.fixed)
-    lifts = (f"lift of {robots[robot].name}" for robot in layout.strokes)
+    factory = layout.factory
+    robots, more = factory.robots, factory.axes[len(factory.robots) :]
+    tools = (f"[{r.index + 1}] the tool of {r.name}, an angle" for r in robots if not r.travels)
+    lifts = (f"{axis.joint.joint} of {axis.robot.name}" for axis in more)
     return "; ".join((", ".join(("carriages of the robots", *tools)), *lifts))
 
 
@@ -137,7 +138,7 @@ def _completed() -> iec.OrganizationUnit:
 
 def _program(layout: Layout) -> iec.OrganizationUnit:
     factory = layout.factory
-    axes = len(layout.guidepaths) + len(layout.strokes)
+    axes = len(factory.axes)
     inputs = (
         iec.Variable("Position", "REAL_LIST", "m"),
         iec.Variable("Speed", "REAL_LIST", "m/s"),

@@ -188,7 +188,7 @@ class RobotBlocks:
     def _motion(self, step: ProgramStep, robot: int) -> Iterator[str]:
         """The set-points of the robot's own axes; behind a gate short of the goal."""
         factory, number = self.layout.factory, step.operation.index
-        mode, axes = self.modes[number], factory.axes[number]
+        mode, axes = self.modes[number], factory.moves[number]
         for slot, axis in enumerate(axes):
             if factory.robot_of(axis) != robot:
                 continue
@@ -225,7 +225,7 @@ class RobotBlocks:
         number = step.operation.index
         mode = self.modes[number]
         yield "        Reached := TRUE;"
-        for slot, axis in enumerate(self.layout.factory.axes[number]):
+        for slot, axis in enumerate(self.layout.factory.moves[number]):
             there = _at(axis, float(mode.goals[slot]), mode.eps)
             still = f"ABS(Axes[{axis + 1}].Speed) < {_real(STILL)}"
             yield f"        Reached := Reached AND {there} AND {still};"

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.engine.simulation.mujoco.axes import Across
+from factory.engine.simulation.mujoco.curves import Curves
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
@@ -29,12 +29,20 @@ INPUTS = 3
 
 
 class Drives:
-    """The drives of some axes, of which `actuators` (axes,) are the numbers, one perhaps of several
-    axes of which at most one moves; their buffers are of one size, and side by side.
+    """The drives of some axes.
 
-    `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
-    [N] (axes,): what it carries.  Where a
-    guidepath has bends an axis has two drives, one for each slide (`across`).
+    Args:
+        arrays: the arrays of the model.
+        d: the engine's data.
+        actuators: the drive of each axis (axes,), one perhaps of several axes of which at most one
+            moves; their buffers are of one size, and side by side.
+        inertia: what moves without a load (axes,) [kg].
+        curves: the axes that move several joints, with a drive for each.
+
+    Attributes:
+        own: what moves without a load (axes,) [kg].
+        mass: what the force of a setpoint accelerates (axes,) [kg].
+        weight: what the drive bears (axes,) [N].
     """
 
     def __init__(
@@ -43,12 +51,12 @@ class Drives:
         d: mujoco.MjData,
         actuators: Index,
         inertia: Array,
-        across: Across | None = None,
+        curves: Curves | None = None,
     ) -> None:
         self.own, self.mass, self.weight = inertia, inertia.copy(), np.zeros(len(inertia))
-        self._across = across
-        if across is not None:
-            actuators = np.concatenate([actuators, across.actuator])
+        self._curves = curves
+        if curves is not None:
+            actuators = np.concatenate([actuators, curves.actuator.ravel()])
         m = arrays.m
         self.timestep = float(m.opt.timestep)
         self._d, self._actuators = d, actuators
@@ -85,39 +93,41 @@ class Drives:
         rest = np.where(v[-1] == 0.0, weight, force[-1])
         after = np.stack([x[-1], v[-1], rest], axis=-1)
         setpoints = np.concatenate([legs.reshape(-1, *after.shape), after[None]]).swapaxes(0, 1)
-        if len(self._bent(axes)[1]):
+        if len(self._curved(axes)[1]):
             a = np.concatenate([np.repeat(a, steps, axis=0), np.where(v[-1] == 0.0, 0.0, a[-1:])])
             lag = np.append(np.full(len(a) - 1, self.timestep / 2), 0.0)
-            return self.bent(axes, setpoints, a.T, lag)
+            return self.spread(axes, setpoints, a.T, lag)
         return setpoints
 
-    def bent(self, axes: Index, setpoints: Array, a: Array, lag: Array) -> Array:
-        """Setpoints with the second slides appended, (n + b, samples, 3), from setpoints (n,
-        samples, 3) along axes, whose speeds are those of `lag` (samples,) [s] before, and
-        accelerations (n, samples) [m/s²]."""
-        which, rows = self._bent(axes)
-        if self._across is None or not len(rows):
+    def spread(self, axes: Index, setpoints: Array, a: Array, lag: Array) -> Array:
+        """Setpoints of joints, those beyond the first of an axis appended (n + b (d - 1), samples,
+        3), from setpoints (n, samples, 3) along axes, whose speeds are those of `lag` (samples,)
+        [s] before, and accelerations (n, samples) [m/s²]."""
+        which, rows = self._curved(axes)
+        if self._curves is None or not len(rows):
             return setpoints
         x, v, a = setpoints[which, :, 0].T, (setpoints[which, :, 1] + a[which] * lag).T, a[which].T
-        place, first, second = self._across.ways.at(rows, x)
+        place, first, second = self._curves.ways.at(rows, x)
         speed = first * v[..., None]
         gain = first * a[..., None] + second * (v**2)[..., None]
         force = self.mass[axes[which]][:, None] * gain
-        both = np.stack([place, speed - lag[:, None, None] * gain, force], axis=-1)
-        setpoints = setpoints.copy()
-        setpoints[which] = both[:, :, 0].swapaxes(0, 1)
-        return np.concatenate([setpoints, both[:, :, 1].swapaxes(0, 1)])
+        every = np.stack([place, speed - lag[:, None, None] * gain, force], axis=-1)
+        every, setpoints = every.transpose(1, 2, 0, 3), setpoints.copy()
+        setpoints[which] = every[:, 0]
+        return np.concatenate([setpoints, every[:, 1:].reshape(-1, *setpoints.shape[1:])])
 
-    def _bent(self, axes: Index) -> tuple[Index, Index]:
-        """Which of some axes have a second slide, and their indices."""
-        if self._across is None or not len(self._across.axes):
+    def _curved(self, axes: Index) -> tuple[Index, Index]:
+        """Which of some axes move several joints, and their rows."""
+        if self._curves is None or not len(self._curves.axes):
             return NO_AXES, NO_AXES
-        return self._across.among(axes)
+        return self._curves.among(axes)
 
     def _rows(self, axes: Index) -> Index:
-        """The drives of axes: first slides, then second ones."""
-        _, rows = self._bent(axes)
-        return np.concatenate([axes, len(self.own) + rows]) if len(rows) else axes
+        """The drives of axes: those of first joints, then all others."""
+        _, rows = self._curved(axes)
+        if self._curves is None or not len(rows):
+            return axes
+        return np.concatenate([axes, len(self.own) + self._curves.further(rows)])
 
     def follow(self, axes: Index, setpoints: Array) -> None:
         """Let axes follow setpoints (n, samples, 3), one each timestep; the last is held."""
@@ -140,7 +150,7 @@ class Drives:
         self._delay[actuators] = self._history[actuators, 0] = 0
         setpoint = self._d.ctrl.reshape(-1, INPUTS)
         setpoints = np.stack([x, np.zeros(len(axes)), self.weight[axes]], axis=-1)[:, None]
-        setpoint[actuators] = self.bent(axes, setpoints, np.zeros((len(axes), 1)), np.zeros(1))[
+        setpoint[actuators] = self.spread(axes, setpoints, np.zeros((len(axes), 1)), np.zeros(1))[
             :, 0
         ]
 

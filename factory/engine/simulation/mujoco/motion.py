@@ -9,8 +9,9 @@ import numpy as np
 
 from factory.engine.mjcf.driving import GRAVITY, ROLLING
 from factory.engine.mjcf.model import Model
-from factory.engine.simulation.mujoco.axes import Across, Axes
+from factory.engine.simulation.mujoco.axes import Axes
 from factory.engine.simulation.mujoco.courses import AHEAD, Course, Follower, along, planned
+from factory.engine.simulation.mujoco.curves import Curves
 from factory.engine.simulation.mujoco.drives import Drives
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.outfeed import Outfeed
@@ -28,14 +29,14 @@ class Guides:
     Args:
         arrays: the arrays of the model.
         dof: the degree of freedom of each axis (axes,).
-        across: the second slides of robots whose guidepaths have bends.
+        curves: the axes that move several joints.
 
     Attributes:
         empty: friction without a load (axes,) [N], at first as in the model.
     """
 
-    def __init__(self, arrays: ModelArrays, dof: Index, across: Across) -> None:
-        self._dof, self._across = dof, across
+    def __init__(self, arrays: ModelArrays, dof: Index, curves: Curves) -> None:
+        self._dof, self._curves = dof, curves
         self._friction = arrays["dof_frictionloss"]
         self.empty = self._friction.now[dof]
         self._loads = np.zeros(len(dof))
@@ -53,10 +54,10 @@ class Guides:
     def _rub(self, axes: Index) -> None:
         weight = self._loads[axes] * GRAVITY
         self._friction[self._dof[axes]] = self.empty[axes] + ROLLING * weight
-        which, rows = self._across.among(np.asarray(axes))
+        which, rows = self._curves.among(np.asarray(axes))
         if len(rows):
             same = self._friction.now[self._dof[np.asarray(axes)[which]]]
-            self._friction[self._across.dof[rows]] = same[:, None]
+            self._friction[self._curves.dof[rows]] = same[:, None]
 
 
 class Motion:
@@ -90,16 +91,17 @@ class Motion:
     ) -> None:
         m = arrays.m
         self.axes, self.settings, self._d = Axes.of(m, model.layout), model.settings, d
-        robots, across = self.axes.actuator[: self.axes.tray], self.axes.across
+        robots, curves = self.axes.actuator[: self.axes.tray], self.axes.curves
         bias, factors = arrays["actuator_biasprm"], np.asarray(gains)[:, None]
         bias[robots, 1:3] = bias.now[robots, 1:3] * factors
-        bias[across.actuator, 1:3] = bias.now[across.actuator, 1:3] * factors[across.axes]
+        for further in curves.actuator.T:
+            bias[further, 1:3] = bias.now[further, 1:3] * factors[curves.axes]
         body, dof = self.axes.body, self.axes.dof
         inertia = m.body_subtreemass[body] + m.dof_armature[dof]
-        turns = self.axes.is_rotary
+        turns = self.axes.rotary
         inertia[turns] = m.dof_M0[dof[turns]]
-        self.drives = Drives(arrays, d, self.axes.actuator, inertia.round(9), across)
-        self.guides = Guides(arrays, dof, across)
+        self.drives = Drives(arrays, d, self.axes.actuator, inertia.round(9), curves)
+        self.guides = Guides(arrays, dof, curves)
         self.sleep = Sleep(arrays, d, self.axes.tree)
         x, v = np.append(start, [0.0, 0.0]), np.zeros(len(self.axes))
         self.axes.put(d, np.arange(len(x)), x)
@@ -113,25 +115,25 @@ class Motion:
     def begin(self, loads: Mapping[int, float]) -> None:
         """Let all axes stand, and each robot (index) carry its load [kg]."""
         every = np.arange(len(self.axes))
-        self.load([*self.axes.lift], [0.0] * len(self.axes.lift))
-        self.load([*loads], [*loads.values()])
+        robots = range(len(self.axes.of_robot))
+        self.load(robots, [loads.get(robot, 0.0) for robot in robots])
         self.robots.stop(every)
 
     def load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
-        """Set the payloads of robots (index) [kg] in drives and guides: at once for lifts that
-        stand, for all others from their next courses on."""
+        """Set the payloads of robots (index) [kg] in drives and guides: at once where a drive that
+        stands bears a weight, for all others from their next courses on."""
         if not robots:
             return
-        lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
-        self.drives.load(carriages, mass * self.axes.inertia[carriages], np.zeros(len(mass)))
-        self.guides.load(carriages, np.where(self.axes.is_rotary[carriages], 0.0, mass))
-        lifts = [n for n, robot in enumerate(robots) if robot in lift]
-        if lifts:
-            axes = np.array([lift[robots[n]] for n in lifts])
-            self.drives.load(axes, mass[lifts], (self.axes.heads[axes] + mass[lifts]) * GRAVITY)
-            stand = axes[self.robots.v[axes] == 0.0]
-            if len(stand):
-                self.drives.stand(stand, self.robots.x[stand])
+        of = self.axes.of_robot
+        axes = np.array([axis for robot in robots for axis in of[robot]])
+        mass = np.repeat(loads, [len(of[robot]) for robot in robots])
+        hanging = self.axes.hanging[axes]
+        weight = np.where(hanging > 0, (hanging + mass) * GRAVITY, 0.0)
+        self.drives.load(axes, mass * self.axes.inertia[axes], weight)
+        self.guides.load(axes, np.where(self.axes.rolls[axes], mass, 0.0))
+        stand = axes[(hanging > 0) & (self.robots.v[axes] == 0.0)]
+        if len(stand):
+            self.drives.stand(stand, self.robots.x[stand])
 
     def put(self, at: Mapping[int, float]) -> None:
         """Place axes elsewhere [m], at rest."""
@@ -268,7 +270,8 @@ class Motion:
             self.robots.x[axes], self.robots.v[axes] = x, v
             force = self.drives.mass[axes] * a + self.drives.weight[axes]
             setpoints = np.stack([x, v, force], axis=-1)[:, None]
-            self.drives.show(axes, self.drives.bent(axes, setpoints, a[:, None], np.zeros(1))[:, 0])
+            setpoints = self.drives.spread(axes, setpoints, a[:, None], np.zeros(1))
+            self.drives.show(axes, setpoints[:, 0])
 
     def _planned(self, axes: Index, t: Array) -> tuple[Array, Array]:
         """Positions and speeds of axes on their plans, some time [s] after these began."""

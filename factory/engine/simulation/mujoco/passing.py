@@ -38,7 +38,8 @@ class _Lifts:
     def of(cls, m: mujoco.MjModel, factory: Factory, outlets: Sequence[Outlet]) -> _Lifts:
         """Those of a model."""
         chosen = [(n, o) for n, o in enumerate(outlets) if o.robot in factory.adjusted]
-        lifts = [m.joint(names.lift(factory.robots[o.robot].name)).id for _, o in chosen]
+        ups = [up for _, o in chosen if (up := factory.up(o.robot)) is not None]
+        lifts = [m.joint(names.joint(factory.axes[up])).id for up in ups]
         level = [o.layout.visits[o.leaf.index, o.robot].up for _, o in chosen]
         numbers = np.array([n for n, _ in chosen], np.intp)
         return cls(numbers, m.jnt_qposadr[np.array(lifts, np.intp)], np.array(level))

@@ -211,9 +211,8 @@ class MujocoWorld:
     def in_the_way(self, away: Container[int]) -> set[int]:
         """Robots (index) that block the late part that they wait for, except those with an axis in
         `away`."""
-        lift = self.motion.axes.lift
-        robots = self.parts.feeders.in_the_way()
-        return {r for r in robots if r not in away and lift.get(r, r) not in away}
+        axes, robots = self.motion.axes.of_robot, self.parts.feeders.in_the_way()
+        return {robot for robot in robots if not any(axis in away for axis in axes[robot])}
 
     def settle(self) -> None:
         """At the end of a tick's timesteps, start the tray's next tick."""

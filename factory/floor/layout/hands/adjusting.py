@@ -17,7 +17,7 @@ def lifts_for(hands: Hands, catalogue: Catalogue) -> frozenset[int]:
     lacking = {
         robot.index
         for robot in factory.robots
-        if robot.index not in factory.strokes and catalogue.meet(robot.type, LIFT) is not None
+        if not factory.goes_up(robot.index) and catalogue.meet(robot.type, LIFT) is not None
     } & without_hands(hands)
     if not lacking:
         return frozenset()

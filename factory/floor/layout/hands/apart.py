@@ -105,11 +105,11 @@ class HandsApart:
         if kind == hand.kind == "below":  # fingers keep to their sides
             return
         way_out = swept(*reach(self.holding.product, kind, places.at, places.radius, u), back(u))
-        way_out[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        way_out[1][:, 2] += self.holding.factory.lowering(robot)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
         low, high = reach(self.holding.product, hand.kind, at, radius, t)
         if hand.kind == "behind":
-            low[:, 2] -= self.holding.factory.strokes.get(carrier, 0.0)
+            low[:, 2] -= self.holding.factory.lowering(carrier)
         if hand.kind == "above":
             yield (*way_out, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2

@@ -72,7 +72,7 @@ class Holding:
 
     def serves_fixed(self, robot: int) -> bool:
         """Whether a fixed robot takes what a robot brings, while no carrier is there."""
-        return self.factory.robots[self.last(robot).carrier].fixed
+        return not self.factory.robots[self.last(robot).carrier].travels
 
     def made(self, robot: int) -> list[Operation]:
         """The operations of which a robot is the carrier."""

@@ -230,10 +230,10 @@ class InTheWay:
         broad = under_beam(kind, low, high, places.radius)
         for boxes in self._from_above(last, robot, (u,)):
             yield (*swept(*broad, back(u)), boxes)
-        lifted = robot in self.holding.factory.strokes
+        lifted = self.holding.factory.goes_up(robot)
         gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
         if kind == "below":
-            gone[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+            gone[1][:, 2] += self.holding.factory.lowering(robot)
         if kind != "behind":
             yield (*gone, self.holding.boxes(last.label))
             return
@@ -249,7 +249,7 @@ class InTheWay:
         which may go on along t meanwhile, or either way if its carrier turns."""
         if kind == "above" and self.holding.factory.lowers(robot):
             low, high = self.reach(kind, places, u)
-            low[:, 2] += self.holding.factory.strokes[robot]
+            low[:, 2] += self.holding.factory.lowering(robot)
             boxes = self.holding.boxes(self.holding.last(robot).label)
             for side in (back(t), t)[: 1 + (self.holding.on[robot] in self.holding.turning)]:
                 yield (*swept(low, high, back(u), side), boxes)
@@ -260,7 +260,7 @@ class InTheWay:
         if self.holding.factory.drops(self.holding.last(robot).index):
             return np.zeros(len(places))
         low, high = self.reach(kind, places, u)
-        high[:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        high[:, 2] += self.holding.factory.lowering(robot)
         onward = self._met_onward(robot)
         past = retreat(low, high, onward, (back(u), back(t)))
         if self.holding.on[robot] in self.holding.turning:
@@ -310,7 +310,7 @@ class InTheWay:
         rising = low
         if kind == "behind":
             low, high = swept(low, high, back(u))
-            rising = low - [0.0, 0.0, self.holding.factory.strokes.get(robot, 0.0)]
+            rising = low - [0.0, 0.0, self.holding.factory.lowering(robot)]
         for operation in self.holding.made(robot):
             later = operation.pile != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
@@ -339,7 +339,7 @@ class InTheWay:
         boxes = self.holding.boxes(operation.before[slot]).copy()
         boxes[:, 1, 2] = np.inf
         yield boxes.copy()
-        boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
+        boxes[:, 0, 2] += self.holding.factory.lowering(operation.robots[slot])
         for side in sides:
             yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
 

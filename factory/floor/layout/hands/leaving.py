@@ -49,8 +49,9 @@ def before_next(layout: Layout, robot: int) -> float:
 
 def raised(layout: Layout, robot: int, after: int) -> Past:
     """When a robot's lift is up for its next tour after an operation (index)."""
-    up = layout.visits[layout.factory.after(robot, after), robot].up
-    return Past(end_of(after), layout.factory.lift_axis[robot], up - SPARE)
+    axis, factory = layout.factory.up(robot), layout.factory
+    assert axis is not None, "its hand is above what it releases"
+    return Past(end_of(after), axis, layout.visits[factory.after(robot, after), robot].up - SPARE)
 
 
 def farther(layout: Layout, robot: int, by: float) -> float:

@@ -77,7 +77,7 @@ class OneHand:
         if holding.is_fed(tour) and holding.is_carrier(tour):
             return "below", "behind"  # the tower of a hand above stands beside a feeder's part
         last = holding.last(tour)
-        if holding.factory.robots[tour].fixed:
+        if not holding.factory.robots[tour].travels:
             return ("above",)
         if last.lowered >= 0 and last.robots[last.lowered] == tour:
             return "above", "behind", "below"
@@ -94,7 +94,7 @@ class OneHand:
             for kind in self._kinds(tour):
                 if self._possible(kind, tour, frames):
                     places, free, _ = self._clear(kind, tour, frames)
-                    lifted = tour in holding.factory.strokes or kind == "behind"
+                    lifted = holding.factory.goes_up(tour) or kind == "behind"
                     heights = np.unique(np.round(places.at[free, 2], 4)) * (not lifted)
                     fits |= {(u, t, kind, z) for u, t in frames for z in heights.tolist()}
         return frozenset(fits)
@@ -133,7 +133,7 @@ class OneHand:
         """The best hand of one kind, with the largest tips among equals; empty if there is none.
         For one tour each place has its best tip."""
         alone = len(tours) == 1
-        lifted = alone or tours[0] in self.in_the_way.holding.factory.strokes
+        lifted = alone or self.in_the_way.holding.factory.goes_up(tours[0])
         lifted |= kind == "behind" and tours[0] in self.adjusted
         possible = all(self._possible(kind, tour, frames) for tour in tours)
         if not possible or not (lifted or self._level(tours)):
@@ -192,7 +192,7 @@ class OneHand:
             while carrier >= 0 and carrier not in above:
                 above.add(carrier)
                 carrier = holding.on[carrier]
-        return above.isdisjoint(holding.factory.strokes)
+        return not any(map(holding.factory.goes_up, above))
 
     def _is_one_of_two(self, tour: int) -> bool:
         """Whether another robot delivers at the same junction: the carrier stands in one place for

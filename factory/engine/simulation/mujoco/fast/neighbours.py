@@ -44,7 +44,7 @@ class Extents:
     goes until it is told another [m]; `along` (n, 2): where that leads, seen from above."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, axes: Axes, robots: int) -> None:
-        bent, first = axes.across, np.array([*range(robots), axes.tray])
+        bent, first = axes.curves, np.array([*range(robots), axes.tray])
         self._every, self._number = axes, np.full(len(axes), -1)
         self._number[first] = np.arange(len(first))
         self._second = len(first) + np.arange(len(bent.axes))
@@ -60,7 +60,7 @@ class Extents:
 
     def go(self, axes: Index, x: Array) -> None:
         """Some axes of a factory go from where they are by positions (ticks, n) [m]."""
-        number, bent = self._number[axes], self._every.across
+        number, bent = self._number[axes], self._every.curves
         which, rows = bent.among(axes)
         if len(rows):
             place, _, _ = bent.ways.at(rows, x[:, which])
@@ -95,7 +95,7 @@ class Neighbours:
         if self.culls:
             mujoco.mj_kinematics(m, d)
             self._ways = Extents(m, d, axes, len(parts.model.factory.robots))
-            turns = axes.is_rotary
+            turns = axes.rotary
             self._box = _boxes(m, d, parts, count)
             _turned(*self._box, self._holder[turns], d.xanchor[m.dof_jntid[axes.dof[turns]], :2])
             self._began = self._ways.low
@@ -162,9 +162,8 @@ class Neighbours:
 
 def _holders(parts: Parts, axes: Axes, shutter: int) -> Index:
     """The code of the holder that each axis (axes,) is of; the shutter holds nothing."""
-    robots = len(parts.model.factory.robots)
-    lifts = (robot + 1 for robot in axes.lift)
-    return np.array([*range(1, robots + 1), *lifts, parts.tray, shutter])
+    robots = (axis.robot.index + 1 for axis in parts.model.factory.axes)
+    return np.array([*robots, parts.tray, shutter])
 
 
 def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
