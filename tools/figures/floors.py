@@ -146,7 +146,7 @@ def draw_stretching(layout: Layout) -> str:
 
 STRETCHED_STYLE = """
 .swept { fill: #e3edf7; } .joint { fill: #ffffff; stroke: #1f2933; stroke-width: 2; }
-.cart { fill: currentColor; fill-opacity: 0.88; } .faint { stroke: currentColor; }
+.cart { fill: currentColor; } .faint { stroke: currentColor; }
 .clash { fill: none; stroke: currentColor; stroke-width: 2; }
 """
 

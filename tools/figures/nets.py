@@ -134,7 +134,7 @@ def draw_exclusion() -> str:
         sheet.link(foot, tip, "wrong", 4.0)
         sheet.place((x, y), "wrong", tokens=tokens)
     for row, words in enumerate(
-        ("p and q lie on one circuit;", "its one token is in p,", "in q, or between them")
+        ("p and q lie on one circuit;", "its one token is in p, in q,", "or in an order place")
     ):
         sheet.words((536.0, 118.0 + 17 * row), words, SMALL, "grey", "start")
     return sheet.svg("Two places that are never marked together")
