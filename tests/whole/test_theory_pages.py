@@ -122,6 +122,14 @@ def test_there_are_ten_exercises_with_solutions_that_run() -> None:
         assert solution.rstrip().endswith("</details>")
 
 
+def test_the_lecture_lasts_90_minutes() -> None:
+    page = (THEORY / "lecture.md").read_text("utf-8")
+    plan = [tuple(map(int, row)) for row in re.findall(r"^\| (\d+) – (\d+) \|", page, re.M)]
+    assert plan == [tuple(map(int, h)) for h in re.findall(r"^## (\d+) – (\d+): ", page, re.M)]
+    assert [begin for begin, _ in plan] == [0, *(end for _, end in plan[:-1])]
+    assert plan[-1][1] == 90
+
+
 @pytest.mark.parametrize("page", sorted(THEORY.glob("*.md")), ids=lambda path: path.stem)
 def test_links_work_where_the_repository_is_read(page: Path) -> None:
     """None leads to a page that is made with the site, or to a folder."""

@@ -33,7 +33,7 @@ def compiled() -> Factory:
 
 def tree() -> str:
     """The paper's example as `factory export --format svg --of tree` draws it."""
-    return factory.export(PAPER, "svg", of="tree")
+    return str(factory.export(PAPER, "svg", of="tree"))
 
 
 FIGURES: Mapping[str, Callable[[], str]] = {

@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from factory.api import Factory, marked
+from factory.api import Array, Factory, marked
 from factory.apps.drawing.canvas import Point
 from factory.apps.recovery.undo import undo
 from factory.floor.layout.way import Bend, Ways
@@ -55,13 +55,13 @@ def draw_corner() -> str:
     return sheet.svg("A corner of a way", ".wrong.hue { fill: #b42318; }\n")
 
 
-def _accelerations(sheet: Sheet, x: np.ndarray, second: np.ndarray) -> None:
+def _accelerations(sheet: Sheet, x: Array, second: Array) -> None:
     left, middle, wide = 482.0, 160.0, 236.0
     low, high = float(x[0]), float(x[-1])
     sheet.link((left, middle), (left + wide + 14, middle), "grey")
     sheet.words((left + wide + 8, middle + 16), "x", PLAIN)
     for axis, gear in ((0, 0), (1, 1)):
-        points = []
+        points: list[Point] = []
         values = np.round(second[:, axis] * 2 * TURN)
         for here, value in zip(x, values, strict=True):
             at = left + wide * (float(here) - low) / (high - low), middle - 62.0 * float(value)

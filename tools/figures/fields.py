@@ -29,25 +29,25 @@ SIDE = 262.0
 def mate() -> Mode:
     """Two robots that bring parts to one point: Δ is a triangle about it."""
     return Mode(
-        goals=[0.1, 0.1],
-        lower=[0.0, 0.0],
-        upper=[LENGTH, LENGTH],
+        goals=np.array([0.1, 0.1]),
+        lower=np.array([0.0, 0.0]),
+        upper=np.array([LENGTH, LENGTH]),
         eps=EPS,
-        pairs=[[0, 1]],
-        meet=[[0.0, 0.0]],
-        touch=[0.12],
+        pairs=np.array([[0, 1]]),
+        meet=np.array([[0.0, 0.0]]),
+        touch=np.array([0.12]),
     )
 
 
 def insert() -> Mode:
     """The second robot waits at a standoff until the first, the carrier, is at its goal."""
     return Mode(
-        goals=[0.1, 0.08],
-        lower=[0.0, 0.0],
-        upper=[LENGTH, LENGTH],
+        goals=np.array([0.1, 0.08]),
+        lower=np.array([0.0, 0.0]),
+        upper=np.array([LENGTH, LENGTH]),
         eps=EPS,
-        gate=[-1, 0],
-        standoff=[0.0, 0.16],
+        gate=np.array([-1, 0]),
+        standoff=np.array([0.0, 0.16]),
     )
 
 

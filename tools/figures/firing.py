@@ -76,7 +76,7 @@ class Firing:
             for name, places in (("before", self.before), ("after", self.after)):
                 place = places[self.operation.place, slot]
                 at = across[name], lanes[robot]
-                sheet.place(at, f"gear{robot}")
+                sheet.node(at, f"gear{robot}")
                 if name == "before" and not fired:
                     sheet.robot(at, robot)
                 shown = self.net.places[place]
@@ -129,7 +129,7 @@ def draw_fragments() -> str:
     for row, (name, y) in enumerate(rows.items()):
         style = f"gear{(4, 5, 2)[row]}"
         for x, label in ((left, "a"), (right, "b")):
-            sheet.place((x, y), style)
+            sheet.node((x, y), style)
             sheet.words((x, y + 22), f"wait(r_{{{name}}}, {label}_{{{name}}})", SMALL)
     for x in (left, right):
         sheet.words((x, 171.0), "⋮", 14.0, "grey")
@@ -150,7 +150,7 @@ def _draw_first(sheet: Sheet) -> None:
         sheet.line("faint", (middle - RADIUS, bottom), (left, bottom), (left, top + RADIUS + 8))
         sheet.head((left, top + RADIUS), (left, top + RADIUS + 8), 3.8, "tip")
     for at in ((left, top), (right, top), (middle, bottom)):
-        sheet.place(at, "gear0", tokens=at[1] == bottom)
+        sheet.node(at, "gear0", tokens=at[1] == bottom)
     sheet.bar((middle, top), 17.0)
     sheet.bar((right, (top + bottom) / 2), 17.0, 0.0)
     for at, words in (

@@ -54,7 +54,7 @@ class LaneNet:
             shared = len(slots[place]) > 1
             style = "shared" if shared else f"gear{slots[place][0]}"
             here = place in self.factory.net.initial_marking
-            sheet.place(at, style, shared=shared, tokens=here)
+            sheet.node(at, style, shared=shared, tokens=here)
             words = shown.mode if shown.mode not in ("wait", "hold") else shown.label
             sheet.words((at[0], at[1] - 20), words, SMALLER, "h" if shared else "")
 
@@ -117,8 +117,8 @@ def draw_exclusion() -> str:
             sheet.bar((x, y), 17.0)
             side = -26 if style == "gear0" else 27
             sheet.words((x, y + side), event, 13.0, "h")
-        sheet.place((200.0, y), style, tokens=1)
-        sheet.place((middle, y), style)
+        sheet.node((200.0, y), style, tokens=1)
+        sheet.node((middle, y), style)
         sheet.words((middle, y + (-23 if style == "gear0" else 24)), name, 13.0, "h")
         with sheet.group(style):
             sheet.words((70.0, y), robot, 17.0, "h hue")
@@ -132,7 +132,7 @@ def draw_exclusion() -> str:
         y = foot[1] + share * (tip[1] - foot[1])
         sheet.line("halo", foot, tip)
         sheet.link(foot, tip, "wrong", 4.0)
-        sheet.place((x, y), "wrong", tokens=tokens)
+        sheet.node((x, y), "wrong", tokens=tokens)
     for row, words in enumerate(
         ("p and q lie on one circuit;", "its one token is in p, in q,", "or in an order place")
     ):

@@ -66,7 +66,7 @@ class Ring:
             sheet.bar(at, 12.0, angle)
         else:
             style = "shared" if node.shared else self.style
-            sheet.place(at, style, shared=node.shared, tokens=node.tokens)
+            sheet.node(at, style, shared=node.shared, tokens=node.tokens)
         if node.words:
             x, y = around(self.centre, self.radius + away, angle)
             side = cos(angle)
@@ -189,7 +189,7 @@ def _one_tooth(sheet: Sheet) -> None:
     top, bottom = (middle, height - half), (middle, height + half)
     sheet.link(top, (middle, height - RADIUS), "shared")
     sheet.link((middle, height + RADIUS), bottom, "shared", 3.0)
-    sheet.place((middle, height), "shared", shared=True)
+    sheet.node((middle, height), "shared", shared=True)
     for at, words, side in ((top, "a", -22), (bottom, "b", 20)):
         sheet.bar(at, 17.0, 0.0)
         sheet.words((at[0], at[1] + side), words, 13.0, "h")
@@ -224,7 +224,7 @@ def _two_teeth(sheet: Sheet) -> None:
     for start, middle, end in TEETH:
         sheet.link((x, y[start]), (x, y[middle] - RADIUS), "shared")
         sheet.link((x, y[middle] + RADIUS), (x, y[end]), "shared", 3.0)
-        sheet.place((x, y[middle]), "shared", shared=True)
+        sheet.node((x, y[middle]), "shared", shared=True)
         sheet.words((x + 18, y[middle]), middle, 13.0, "h", "start")
     for start, end, way, by, style, tokens in WAITS:
         foot, down = x + way * side, 1 if y[end] > y[start] else -1
@@ -233,7 +233,7 @@ def _two_teeth(sheet: Sheet) -> None:
             sheet.add("path", "arc", d=_bow(foot, y[start], tip - HEAD[0] + 2, way * by))
             sheet.head((foot, tip), (foot, tip - HEAD[0]), HEAD[1], "tip")
         far = 0.75 * by if down > 0 else by
-        sheet.place((foot + way * far, (y[start] + y[end]) / 2), style, tokens=tokens)
+        sheet.node((foot + way * far, (y[start] + y[end]) / 2), style, tokens=tokens)
     for name in "abcd":
         sheet.bar((x, y[name]), 19.0, 0.0)
         sheet.words((x + 30, y[name]), name, SMALL, "grey")

@@ -74,7 +74,7 @@ class Sheet(Canvas):
 
     # --- nodes of nets ---------------------------------------------------------------------------
 
-    def place(self, at: Point, style: str, *, shared: bool = False, tokens: int = 0) -> None:
+    def node(self, at: Point, style: str, *, shared: bool = False, tokens: int = 0) -> None:
         """A place, shared by gears or of one, with a token or without."""
         with self.group(style):
             self.circle(at, RADIUS, "op" if shared else "ring")
