@@ -14,6 +14,7 @@ from tools.figures.fields import draw_spaces
 from tools.figures.firing import Firing, draw_fragments
 from tools.figures.floors import draw_gluing, draw_stretching, draw_way
 from tools.figures.nets import draw_exclusion, draw_net
+from tools.figures.pace import draw_pace
 from tools.figures.rings import GearPicture, draw_tooth
 
 PAPER = Path(__file__).resolve().parents[2] / "examples" / "paper.pag"
@@ -47,6 +48,7 @@ FIGURES: Mapping[str, Callable[[], str]] = {
     "stretching": lambda: draw_stretching(layout()),
     "spaces": draw_spaces,
     "train": lambda: draw_net(factory.compile(PAPER, robots=3), (2, 0, 1)),
+    "pace": lambda: draw_pace(layout()),
     "corner": draw_corner,
     "tee": draw_tee,
     "counts": lambda: draw_counts(compiled()),
