@@ -34,12 +34,15 @@ def test_a_figure_is_what_is_drawn_anew(name: str) -> None:
 
 
 def test_every_figure_is_shown_and_every_picture_is_a_figure() -> None:
-    """With words for those who do not see it."""
+    """With words for those who do not see it, whose figures are on it."""
     pages = [path.read_text("utf-8") for path in sorted(THEORY.glob("*.md"))]
     shown = [pair for page in pages for pair in re.findall(r"!\[([^]]*)\]\(figures/(\S+)\)", page)]
     assert {name for _, name in shown} == {path.name for path in FOLDER.iterdir()}
     assert {path.stem for path in FOLDER.iterdir()} == {*FIGURES}
     assert min(len(words) for words, _ in shown) >= 25
+    for words, name in shown:
+        text = (FOLDER / name).read_text("utf-8")
+        assert all(number in text for number in re.findall(r"\d+\.\d+", words)), words
 
 
 @pytest.mark.parametrize("name", FIGURES)
