@@ -161,8 +161,13 @@ class Action:
 
     @property
     def points(self) -> Array:
-        """All corners (n, 3) [m]."""
+        """All corners (n, 3) of what moves and of feeders [m]."""
         return np.concatenate([self.robots, self.beside]).reshape(-1, 3)
+
+    @property
+    def framed(self) -> Array:
+        """All corners (n, 3) that a picture of the whole shows: these, and the shed's [m]."""
+        return np.concatenate([self.robots, self.beside, self.shed]).reshape(-1, 3)
 
 
 def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:

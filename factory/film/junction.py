@@ -20,7 +20,9 @@ from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import box_of, is_stand, outlines, placed, shape_of
 from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.floor.geometry.solids import rotation
 from factory.support.arrays import Array
+from factory.support.engine import mujoco
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
@@ -42,6 +44,10 @@ are tried [degrees]."""
 OUTSIDE = 0.4
 """How much it counts to look from the side on which a label is joined."""
 
+THERE = 0.6
+"""A robot is in its place as far as a picture shows that is off it by such a share of half the
+picture's height."""
+
 TOUCH = 1e-4
 """Penetration from which bodies count as touching [m]."""
 
@@ -55,12 +61,31 @@ class Handover:
         view: the camera.
         robots: the names of the robots that take part.
         merit: how well it is seen: the more, the less is hidden and the more from aside.
+        foot: the carriage (body) of the robot that it is handed to.
+        place: where that is then, seen from above (2,) [m].
     """
 
     watched: Array
     view: View
     robots: frozenset[str]
     merit: float
+    foot: int
+    place: Array
+
+    def is_there(self, m: mujoco.MjModel, qpos: Array) -> bool:
+        """Whether the carriage is in its place in a configuration (nq,), or about there."""
+        off = float(np.linalg.norm(foot_at(m, qpos, self.foot) - self.place))
+        return off < THERE * self.view.distance * self.view.tall
+
+
+def foot_at(m: mujoco.MjModel, qpos: Array, foot: int) -> Array:
+    """Where a carriage (body) is in a configuration (nq,), seen from above (2,) [m]."""
+    first = int(m.body_jntadr[foot])
+    at, frame = np.array(m.body_pos[foot]), rotation(m.body_quat[foot])
+    for joint in range(first, first + int(m.body_jntnum[foot])):
+        address = m.jnt_qposadr[joint]
+        at += frame @ m.jnt_axis[joint] * (qpos[address] - m.qpos0[address])
+    return at[:2]
 
 
 def handover_of(
@@ -70,7 +95,9 @@ def handover_of(
     factory, before = subject.factory, replica.d.qpos.copy()
     made = factory.by_label[label]
     taking = factory.operations[factory.parents[made.index]]
+    foot = replica.m.body(names.carriage(factory.robots[taking.carrier].name)).id
     _gather(replica, subject, taking)
+    place = replica.d.xpos[foot][:2].copy()
     load = _load(replica, subject, made)
     hands, arms = _hands(replica, subject, taking)
     joined, limbs = _joined(replica, subject, taking, made), _limbs(replica, subject, taking)
@@ -91,7 +118,7 @@ def handover_of(
     best = int(np.argmax(seen))
     view, merit = views[best], float(seen[best])
     robots = frozenset(factory.robots[robot].name for robot in taking.robots)
-    return Handover(watched, replace(view, depth=view.distance), robots, merit)
+    return Handover(watched, replace(view, depth=view.distance), robots, merit, foot, place)
 
 
 def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> None:
@@ -143,10 +170,12 @@ def _along(tried: Array, arms: Sequence[Array]) -> Array:
 
 
 def _stands(replica: Replica) -> Array:
-    """The boxes (n, 8, 3) round what stands still and does not fade: housings and the shed."""
+    """The boxes (n, 8, 3) round what does not fade: housings, and the shed with its shutter."""
     m, d = replica.m, replica.d
-    bodies = [b for b in range(1, m.nbody) if names.kind(m.body(b).name) in ("feeder", "outfeed")]
-    geoms = (g for b in bodies if m.body_weldid[b] == 0 for g in Geoms(m).shown(b))
+    called = {b: m.body(b).name for b in range(1, m.nbody)}
+    bodies = [b for b, name in called.items() if names.kind(name) in ("feeder", "outfeed")]
+    still = (b for b in bodies if m.body_weldid[b] == 0 or called[b] == names.SHUTTER)
+    geoms = (g for b in still for g in Geoms(m).shown(b))
     boxes = [placed(m, d, g) for g in geoms if not is_stand(m.geom(g).name)]
     return np.array(boxes).reshape(-1, 8, 3)
 

@@ -1,8 +1,9 @@
 """A tour: the camera of a film that cuts between the whole factory, two hand-overs from near by,
 and at the end the last product as it is delivered.
 
-It cuts at events: to a hand-over when its operation starts, back a moment after it has ended, and
-to the delivery when the last unit is whole. It knows what has fired and nothing of what comes.
+It cuts at events: to a hand-over when its operation has started and the robot that takes the part
+is there, back a moment after it has ended or when that robot goes on, and to the delivery when the
+last unit is whole. It knows what has fired and nothing of what comes.
 """
 
 from __future__ import annotations
@@ -50,6 +51,7 @@ class Tour:
         ends = ((int(factory.by_label[product].end), product) for product in factory.products)
         self.wholes = dict(ends)
         self.near: Handover | None = None
+        self.coming: Handover | None = None
         self.awaited, self.last = -1, ""
         self.seen, self.left = 0, units
         self.until, self.free = 0.0, OPENING
@@ -70,6 +72,7 @@ class Tour:
         while self.seen < len(times) and times[self.seen] < time - TIE:
             self._see(times[self.seen], events[self.seen])
             self.seen += 1
+        self._come_and_go(shown, time)
         if time >= self.until:
             self.near = self._handover(self.last) if self.last else None
             self.until = float("inf") if self.last else self.until
@@ -78,14 +81,23 @@ class Tour:
     def _see(self, time: float, event: int) -> None:
         """Note a firing."""
         if event in self.stops and time >= self.free and not self.last:
-            taking, self.near = self.stops.pop(event)
-            self.awaited = taking.end
-            self._stay(time + LONGEST)
-        elif event == self.awaited and time < self.until:
-            self._stay(min(self.until, time + STAYS))
+            taking, self.coming = self.stops.pop(event)
+            self.awaited, self.free = taking.end, float("inf")
+        elif event == self.awaited:
+            self.awaited, self.coming = -1, None
+            self._stay(min(self.until, time + STAYS) if self.near else time)
         if event in self.wholes:
             self.left -= 1
             self.last = self.wholes[event] if self.left == 0 else self.last
+
+    def _come_and_go(self, shown: Snapshot, time: float) -> None:
+        """Be at a hand-over while the robot that takes the part is there, until it goes on."""
+        m, qpos = self.replica.m, shown.qpos
+        if self.coming is not None and self.coming.is_there(m, qpos):
+            self.near, self.coming = self.coming, None
+            self._stay(time + LONGEST)
+        elif self.near and self.awaited < 0 and not self.near.is_there(m, qpos) and not self.last:
+            self._stay(min(self.until, time))
 
     def _stay(self, until: float) -> None:
         """Stay at a hand-over until a time."""

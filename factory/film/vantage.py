@@ -25,10 +25,10 @@ def overview(action: Action, framing: Framing) -> View:
     """The view of an action, aslant: from the south or from the side that shows the most of it; the
     narrower the picture, the higher up."""
     elevation = 40.0 if framing.aspect > 1.2 else 46.0 if framing.aspect > 0.8 else 52.0
-    points = action.points
+    points, framed = action.points, action.framed
 
     def view_from(azimuth: float) -> View:
-        return fit(points, towards(azimuth, elevation), framing)
+        return fit(framed, towards(azimuth, elevation), framing)
 
     usual = view_from(USUAL)
     enough = BETTER * _worth(action, usual)

@@ -292,24 +292,29 @@ def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
 
 
 def test_a_tour_cuts_at_events(log, take) -> None:
-    """From the overview to a hand-over as its operation starts, back a moment after its end, and
-    in the end to the delivery of the last product."""
+    """From the overview to a hand-over that has started, when its carrier is there, back a moment
+    after its end or when the carrier goes on, and in the end to the delivery of the last
+    product."""
     factory, history = take.subject.factory, History(take.subject)
     history.catch_up(log.timed_entries, float("inf"))
     tour = Tour(Replica(take.m), WIDE, history, 2)
     cuts, last = list[tuple[float, frozenset[str] | None]](), None
     for time in np.arange(0.0, float(log.time[-1]), 1 / 30):
-        tour.view(moment_of(log, 0).shown, 1 / 30, float(time))
+        shown = moment_of(log, log.row_at(float(time))).shown
+        tour.view(shown, 1 / 30, float(time))
+        if tour.near and not tour.last:
+            assert tour.near.is_there(take.m, shown.qpos)
         if tour.concerned != last:
             cuts.append((float(time), tour.concerned))
             last = tour.concerned
     (first, robots), (back, nobody), *_, (end, output) = cuts
     starts = [(t, factory.by_label[name[:-2]]) for t, name in log.events if name.endswith("_s")]
     ends = [(t, name[:-2]) for t, name in log.events if name.endswith("_e")]
-    when, taking = next((t, o) for t, o in starts if 0 < first - t <= 1 / 30 + 1e-6)
-    assert robots == {factory.robots[r].name for r in taking.robots} and len(taking.inputs) > 1
+    of = [(t, o) for t, o in starts if robots == {factory.robots[r].name for r in o.robots}]
+    when, taking = next((t, o) for t, o in reversed(of) if t < first)
     done = next(t for t, label in ends if label == taking.label and t > when)
-    assert nobody is None and 0 <= back - (done + STAYS) < 1 / 30 + 1e-6
+    assert len(taking.inputs) > 1 and when < first < done
+    assert nobody is None and 0 < back - done <= STAYS + 1 / 30 + 1e-6
     assert first >= OPENING
     others = [time for time, concerned in cuts[1:-1] if concerned]
     assert all(time - back >= BETWEEN for time in others)
