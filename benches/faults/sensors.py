@@ -17,7 +17,7 @@ BEFORE = {
     "deaths": "each robot dies",
     "production": "production with failures",
 }
-TIMES, UNITS = (2, 3, 4, 6), 100
+TIMES, UNITS = (2, 3, 4, 6), 50
 """So many times the usual noise, in runs of so many units."""
 
 

@@ -11,7 +11,6 @@ REPORT = Report(
     " (`python -m benches.fidelity NAME` for one section) from what is kept in docs/fidelity/.",
     (
         "seeds",
-        "paces",
         "approaches",
         "convergence",
         "disturbances",

@@ -1,8 +1,8 @@
-"""Every figure of `factory fidelity` over 50 seeds at jitter 0.3, for the paper's example, our own
+"""Every figure of `factory fidelity` over seeds at jitter 0.3, for the paper's example, our own
 products and the LDraw products, with the independent monitor beside every run.
 
 What must hold: it refines the net every time, nothing touches that should not, product error at
-most 0.1 mm, hand-off gap at most 0.2 mm, cycle time within 2 %
+most 0.1 mm, hand-off gap at most 0.2 mm, cycle time within 1 %
 of the predicted one, nothing that is drawn more than 0.1 mm inside anything, pads within 0.5 mm of
 what they take, and every hand within its strength.
 """
@@ -31,7 +31,7 @@ LIMITS = {
     "engine_warnings": 0.0,
     "product_error_max_mm": 0.1,
     "handoff_gap_max_mm": 0.2,
-    "cycle_from_predicted_percent": 2.0,
+    "cycle_from_predicted_percent": 1.0,
     "hidden_penetration_max_mm": 0.1,
     "grip_gap_max_mm": 0.5,
     "grip_strength_share_max": 1.0,
@@ -54,21 +54,20 @@ class Plan:
     takes to see the cycle time."""
 
     product: str
-    seeds: int = 50
+    seeds: int = 20
     units: int | None = None
 
 
 PLANS = (
-    Plan(PAPER),
+    Plan(PAPER, 50),
     *(Plan(name) for name in (*REAL, "chest")),
     Plan("30023-1-Lighthouse"),
     Plan("889-1-RadarTruck"),
-    Plan("6966-1-JediStarfighter-Mini"),
-    Plan("4494-1-Imperial_Shuttle-Mini"),
-    Plan("5935-1-IslandHopper", units=1),
-    Plan("5935-1-IslandHopper", seeds=4),
+    Plan("6966-1-JediStarfighter-Mini", 10),
+    Plan("4494-1-Imperial_Shuttle-Mini", 10),
+    Plan("5935-1-IslandHopper", 4),
 )
-"""203 bricks take too long to be watched 200 times."""
+"""So many that all take about ten minutes: 203 bricks are watched four times."""
 
 QUICK = (Plan(PAPER, 2), Plan("gearbox", 1, 2))
 

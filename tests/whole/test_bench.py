@@ -13,7 +13,6 @@ import pytest
 from benches import reporting
 from benches.compare.__main__ import REPORT as COMPARISON
 from benches.faults.__main__ import REPORT as FAULTS
-from benches.fidelity import paces
 from benches.fidelity.__main__ import REPORT as FIDELITY
 from benches.reporting import Report
 from benches.speed import floors, large, processes, production, replaying
@@ -132,11 +131,3 @@ def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.Monke
 def test_the_import_of_a_large_product_is_measured() -> None:
     (row,) = large.measure(quick=True)["rows"]
     assert row["command"] == "import" and row["said"]["parts"] == 1253
-
-
-def test_the_pace_of_the_papers_example_is_that_of_its_net() -> None:
-    (results,) = paces.measure(quick=True)
-    (found,) = results["products"]
-    assert found["done"] == found["refines_net"] == found["seeds"] == 2
-    assert 0 < max(abs(found["off_least_percent"]), abs(found["off_most_percent"])) < paces.LIMIT
-    assert "2 of 2" in paces.section(results)
