@@ -94,7 +94,7 @@ TEXT = f"""\
 FILE --units {UNITS}`. *Without waits*: the same layout; the supervisor does not keep the order
 places of the [coordinated net](theory/coordinated.md), so robots do not wait until the hands of
 others are gone. Products whose layout needs no such wait have no such row. The reason is
-the [code](reference/diagnostics.md) that the verdict of the run gives first."""
+the [code](reference/index.md) that the verdict of the run gives first."""
 
 NETS = """\
 An order place with a token says which of two machines is first. Without the token each waits for

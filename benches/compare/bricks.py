@@ -92,7 +92,7 @@ TEXT = """\
 once, in a process of its own; the cache is empty when a product's first one begins. Times are of
 the processor. *Clean run*:
 exit status 0, that is, all units made, the record refines the net, the monitor agrees, no
-unintended contact. *Reason*: the [codes](reference/diagnostics.md) of the
+unintended contact. *Reason*: the [codes](reference/index.md) of the
 verdict. *Blocked*: operations of the tree, taken as it is drawn, in which parts pass through each
 other on straight ways, as `check` says; such pairs do not collide, and a run names them.
 
