@@ -13,12 +13,9 @@ import factory
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
-from factory.engine.mjcf.pads import Pads
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.clearance import certify
-from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.exclusions import awaited_positions, coordinated
 from factory.floor.layout.hands.bores import bores
 from factory.floor.layout.hands.choosing import Hands
@@ -83,17 +80,6 @@ def test_a_large_ball_is_held_at_its_surface(tmp_path: Path) -> None:
     figures = simulation.physical.figures()
     assert figures.grip_gap_max_mm is not None and 0.0 < figures.grip_gap_max_mm < GRIP_MM
     assert hidden.deepest() < AT_MOST_MM
-
-
-def test_without_hands_pins_are_inside_other_things() -> None:
-    """And they hold nothing: no robot has a pad then whose gap is measured."""
-    plan = factory.compile(factory.load_pag(EXAMPLES / "lamp.pag"))
-    simulation, hidden = looked_at(lay_out(plan, product_geometry(plan.pag)))
-    m = simulation.physical.m
-    holders = {m.body(body).name for body in Pads(m).of}
-    assert hidden.deepest() > 10
-    assert not any(names.kind(holder) == "robot" for holder in holders)
-    assert names.OUTFEED_TRAY in holders
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
