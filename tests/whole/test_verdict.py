@@ -33,6 +33,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.pipeline import read
+from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from tests.command_line import Terminal
@@ -458,3 +459,18 @@ def test_what_finds_no_contact_is_tried_with_other_parts(monkeypatch: pytest.Mon
     assert probing.untouched(None, np.arange(5), parts) == [0, 1, 2, 3, 4]  # type: ignore[arg-type]
     for geom in range(5):
         assert {body for body, at in tried if at == geom} == {14, 15, 16}
+
+
+def test_a_plate_touches_the_floor_wherever_it_is_put() -> None:
+    """Exactly on the diagonal of a square floor the engine found no contact with some plates."""
+    corners = "-1 1 1  -1 1 -1  -1 -1 -1  1 1 -1  1 1 1  -1 -1 1  1 -1 1  1 -1 -1"
+    for half, x, y in ((7.7427, 1.4527, 0.1658), (11.0922, -0.3093, -1.8867)):
+        m = mujoco.MjModel.from_xml_string(f"""
+            <mujoco>
+              <asset><mesh name="plate" scale="0.0877 0.0877 0.0044" vertex="{corners}"/></asset>
+              <worldbody>
+                <geom type="box" size="{half} {half} 0.1" pos="{x} {y} -0.1"/>
+                <body pos="-0.206 -0.198 0.104"><freejoint/><geom type="mesh" mesh="plate"/></body>
+              </worldbody>
+            </mujoco>""")
+        assert probing.untouched(m, np.array([0]), {1: np.array([1])}) == []

@@ -20,6 +20,10 @@ PROBE = 1 << 28
 AT_ONCE = 64
 """Number of parts that are put somewhere at once."""
 
+ASIDE = np.array([0.5, 0.19, 0.23])
+"""Where a part is put, in shares of a box's half lengths. They are unequal: on the diagonal of a
+square floor the engine finds no contact with some plates."""
+
 TYPE = mujoco.mjtGeom
 
 
@@ -92,18 +96,20 @@ class _Probes:
             self._replica.mask(self._parts[body], self._own[body], *masks_of(code))
 
     def _inside(self, geom: int) -> Array:
-        """A point (3,) in a geom, half way from its middle to its end [m]."""
+        """A point (3,) in a geom, about half way from its middle to its end and in none of its
+        planes of symmetry [m]."""
         m = self._replica.m
         kind, size = int(m.geom_type[geom]), m.geom_size[geom]
         if kind == TYPE.mjGEOM_MESH:
             mesh = int(m.geom_dataid[geom])
             first = int(m.mesh_vertadr[mesh])
             vertices = m.mesh_vert[first : first + int(m.mesh_vertnum[mesh])]
-            end = vertices[int((vertices**2).sum(axis=1).argmax())]
+            corners = vertices[[int((vertices**2).sum(axis=1).argmax()), 0, -1]]
+            inside = ASIDE @ corners
         elif kind == TYPE.mjGEOM_PLANE:
-            end = np.zeros(3)
+            inside = np.zeros(3)
         elif kind == TYPE.mjGEOM_BOX:
-            end = size
+            inside = ASIDE * size
         else:  # round: a sphere, a cylinder, a capsule
-            end = np.array([size[0], 0.0, 0.0])
-        return np.asarray(self._at[geom] + self._turn[geom] @ (end / 2))
+            inside = ASIDE * (size[0], size[0], size[1] or size[0])
+        return np.asarray(self._at[geom] + self._turn[geom] @ inside)
