@@ -4,7 +4,8 @@ a cycle time.
 The search begins with the product as written, and with the forms and lines that are best by
 estimate (`estimating.py`) under bounds on cycles from long to short. The Pareto-optimal estimates
 are laid out, the most promising first. Then one join of the best factory is changed at a time,
-those of the slowest robot first, as long as this improves it. All are judged by their layouts.
+those of the slowest robot first, as long as this improves it. All are judged by their layouts,
+on rails also where a platen is asked for, whose bends change the cycle time little.
 """
 
 from __future__ import annotations
@@ -69,7 +70,9 @@ def allocated(
             message += f", only with {best.robots}"
             hint = f"--robots {best.robots}, or {hint}"
         raise InputError(Diagnostic("TooFewRobots", message + search.why(), None, hint))
-    if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
+    if project.ground.tile is not None:
+        best = replace(best, single=best.single.with_ground(project.ground))
+    elif aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
         plain = best if best.filling is None else search.written
         relayed = replace(plain, single=plain.single.with_ground(project.ground))
         best = min(best, relayed, key=search.rank)
@@ -87,7 +90,9 @@ class Search:
         self.aim, effort = aim, aim.effort or usual_effort(len(project.pag))
         self.budget = Allowance(effort, aim.seconds)
         self.forms = Allowance(effort, aim.seconds)
-        bare = replace(project.ground, relay=False, cycle=None)
+        bare = replace(project.ground, relay=False, cycle=None, tile=None)
+        if project.ground.tile is not None:  # the floor is that of the bends, which are found last
+            bare = replace(bare, floor=None)
         self.estimator = estimator or Estimator(project.with_ground(bare), aim.branches)
         self.written = self.best = self.estimator.written
 

@@ -23,8 +23,9 @@ from factory.floor.layout.layout import branch_of
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.way import Bend, rounding_for
 
-TRIES, MOST = 220, 10_000
-"""So many changes are tried for each guidepath, and for all of them at most."""
+TRIES, EFFORT = 220, 120_000
+"""Changes that are tried for each guidepath, and at most robots times changes: each takes a time
+that grows with the number of robots."""
 
 SEARCHES = 2
 """So many times it is looked, from other random numbers; the best is taken."""
@@ -77,7 +78,8 @@ class Reach:
 
 def compacted(layout: Layout, pace: Pace) -> list[Layout]:
     """Layouts with bends, each taking less floor than the one before; not certified."""
-    tries = min(TRIES * len(layout.guidepaths), MOST)
+    robots = len(layout.guidepaths)
+    tries = min(TRIES * robots, EFFORT // robots)
     searches = (_Search(layout, pace, seed).better(tries) for seed in range(SEARCHES))
     pairs = [pair for search in searches for pair in search]
     return [made for _, made in sorted(pairs, key=lambda pair: -pair[0])]

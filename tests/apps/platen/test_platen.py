@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 
 import factory
 from factory.apps.exports.floor_plan import flat_shapes
+from factory.apps.few_robots.aim import Aim
+from factory.apps.few_robots.search import allocated
 from factory.apps.platen import compacting
 from factory.apps.platen.compacting import compacted
 from factory.apps.platen.placing import Floor, Placing
@@ -18,10 +21,12 @@ from factory.floor.layout.bending import Detour
 from factory.floor.layout.clearance import searched
 from factory.floor.layout.durations import Pace, cycle_of
 from factory.floor.layout.layout import Layout
+from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import fill_of, tiles_of
 from factory.floor.layout.way import Bend
+from factory.pipeline import read
 from factory.support.errors import InputError, RunError
 from factory.support.tables import table_of, value_of
 from tests.command_line import spawn
@@ -98,6 +103,38 @@ def test_a_search_is_the_same_each_time(straight: Layout, monkeypatch: pytest.Mo
     monkeypatch.setattr(compacting, "TRIES", 10)
     one, other = (compacted(straight, PACE) for _ in range(2))
     assert [a.guidepaths for a in one] == [b.guidepaths for b in other]
+
+
+def test_a_search_takes_no_longer_for_many_robots(
+    straight: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A change takes a time that grows with the robots, so there are fewer of them."""
+    tried = dict[int, int]()
+
+    class Search:
+        def __init__(self, layout: Layout, *_: object) -> None:
+            self.robots = len(layout.guidepaths)
+
+        def better(self, tries: int) -> list[tuple[float, Layout]]:
+            tried[self.robots] = tries
+            return []
+
+    monkeypatch.setattr(compacting, "_Search", Search)
+    for count in (1, 23, 100, 1000):
+        compacted(replace(straight, guidepaths=straight.guidepaths[:1] * count), PACE)
+    assert tried == {1: 220, 23: 5060, 100: 1200, 1000: 120}
+
+
+def test_few_robots_are_looked_for_on_rails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of a hundred layouts with a search for bends of its own took an hour."""
+    searched_for = list[Layout]()
+    monkeypatch.setattr(
+        "factory.apps.platen.platen.compacted", lambda made, _: searched_for.append(made) or []
+    )
+    project = read(ROOT / "examples" / "paper.pag", ground=Ground((4.0, 3.0), tile=0.24))
+    best = allocated(project, Aim(robots="least", effort=10))
+    assert best.layout.tile == 0.24 and best.ground == project.ground
+    assert [len(made.guidepaths) for made in searched_for] == [len(best.layout.guidepaths)] == [3]
 
 
 def test_tiles_lie_under_all_regions_and_nowhere_else(platen: Layout) -> None:
