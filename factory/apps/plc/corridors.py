@@ -12,15 +12,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from factory.api import Array, Layout, Mode
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.presence import Span
-from factory.floor.layout.staying import Staying, Sweep
+from factory.floor.layout.staying import LATE, Staying, Sweep
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3
 """An axis is where it has to be within this [m]."""
+
+SOON = 2 * LATE
+"""An axis that is let go on by a tick stops so much further at most [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,8 @@ class Corridors:
 
     def __init__(self, layout: Layout, net: Coordinated, modes: Sequence[Mode]) -> None:
         self._factory, self._modes = layout.factory, modes
+        strokes = [layout.strokes[robot] for robot in layout.factory.strokes]
+        self._ends = np.array([*(path.length for path in layout.guidepaths), *strokes])
         ended = {int(place): past for past, (place, _) in net.passes.items()}
         self._ways = dict[tuple[int, int], list[WayPart]]()
         for presence in Staying(layout, net, awaited_positions(layout)).presences():
@@ -49,13 +56,17 @@ class Corridors:
         self, marked: Sequence[int], fired: Sequence[int], x: Array, stops: Array
     ) -> tuple[Array, Array]:
         """The lowest and the highest target of each axis (n,) [m] in a marking, with firing counts
-        `fired`, axes at `x` that can stop at `stops` [m]. Remembers the passes."""
-        low, high = x.copy(), x.copy()
+        `fired`, axes at `x` that can stop at `stops` [m]. A robot that is nowhere on its way stays
+        where it is: at the start of a run one stands under the part of its feeder. Remembers the
+        passes."""
+        low, high = (np.clip(x, 0.0, self._ends) for _ in range(2))
         for (robot, place), stretches in self._ways.items():
             if not marked[place]:
                 continue
             axes = self._factory.axes_of(robot)
             sweeps = [*self._left(stretches, fired, x)]
+            if min(_off(sweep, x[axes]) for sweep in sweeps) > LATE:
+                continue
             for which, axis in enumerate(axes):
                 other = float(x[axes[1 - which]]) if len(axes) == 2 else 0.0
                 spans = _beside(sweeps, which, other) if len(axes) == 2 else [s[0] for s in sweeps]
@@ -64,7 +75,7 @@ class Corridors:
         for operation, mode in zip(self._factory.operations, self._modes, strict=True):
             if marked[operation.place]:
                 axes = [*self._factory.moves[operation.index]]
-                _keep_gates(mode, axes, x, low, high)
+                _keep_gates(mode, axes, x, stops, low, high)
                 _keep_apart(mode, axes, x, stops, low, high)
         return low, high
 
@@ -82,27 +93,39 @@ class Corridors:
             yield from stretch.sweeps
 
 
+def _outside(span: Span, at: float) -> float:
+    """How far a place is outside a span [m]."""
+    return max(min(span) - at, at - max(span), 0.0)
+
+
+def _off(sweep: Sweep, at: Array) -> float:
+    """How far axes are outside a sweep [m]."""
+    return max(_outside(span, there) for span, there in zip(sweep, at.tolist(), strict=False))
+
+
 def _beside(sweeps: Sequence[Sweep], which: int, other: float) -> list[Span]:
     """The spans of one of two axes, 0 or 1, in the sweeps in which the other may be where it is,
     or in those that are nearest to that."""
-    off = [max(min(s[1 - which]) - other, other - max(s[1 - which]), 0.0) for s in sweeps]
+    off = [_outside(sweep[1 - which], other) for sweep in sweeps]
     reach = max(SLACK, min(off))
     return [sweep[which] for sweep, far in zip(sweeps, off, strict=True) if far <= reach]
 
 
-def _keep_gates(mode: Mode, axes: Sequence[int], x: Array, low: Array, high: Array) -> None:
+def _keep_gates(
+    mode: Mode, axes: Sequence[int], x: Array, stops: Array, low: Array, high: Array
+) -> None:
     """No axis comes nearer to its goal than its standoff before its gate stands at its own, and the
-    gate stays there then."""
+    gate stays there from when the axis can be nearer."""
     for slot, gate in enumerate(mode.gate.tolist()):
         standoff = float(mode.standoff[slot])
         if gate < 0 or standoff <= 0.0:
             continue
         axis, guard = axes[slot], axes[gate]
         goal, nearest = float(mode.goals[gate]), float(mode.goals[slot]) + standoff
-        if x[axis] < nearest - mode.eps:
-            ends = goal - mode.eps, goal + mode.eps
-            low[guard], high[guard] = max(low[guard], ends[0]), min(high[guard], ends[1])
-        if abs(float(x[guard]) - goal) >= mode.eps:
+        is_there = max(abs(float(at[guard]) - goal) for at in (x, stops)) < mode.eps
+        if stops[axis] < nearest + (SOON if is_there else -mode.eps):
+            low[guard] = high[guard] = goal
+        if not is_there:
             low[axis] = max(low[axis], min(nearest, float(x[axis])))
 
 

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 
 class DrivenSupervisor:
     """Lets a `controller` drive a plant through its `interlock`, asking it every `scan` [s],
-    rounded to whole timesteps. No axis leaves its corridor; after a contact that is not meant, or a
-    dropped part, all axes stand for good: `tripped`."""
+    rounded to whole timesteps. The plant looks every tick, however seldom it is asked: no axis
+    leaves its corridor, and after a contact that is not meant, or a dropped part, all axes stand
+    for good: `tripped`."""
 
     def __init__(
         self,
@@ -37,7 +38,8 @@ class DrivenSupervisor:
         self.interlock, self._controller = interlock, controller
         self.tripped, self._astray = False, set[int]()
         self._steps, self._period = settings.steps, max(1, round(scan / settings.step))
-        self.drives = AxisDrives(interlock.commands.target, limits, self._period * settings.step)
+        self._look = min(self._period, settings.steps)
+        self.drives = AxisDrives(interlock.commands.target, limits, self._look * settings.step)
         self._count = 0
 
     @property
@@ -80,12 +82,17 @@ class DrivenSupervisor:
         self.drives.limits = limits
 
     def step(self, ticks: int = 1) -> None:
-        """Advance the world by a tick, with a scan of the controller at each of its times."""
+        """Advance the world by a tick, with a scan of the controller at each of its times, and of
+        the plant at its own."""
         world, end = self.interlock.world, self._count + self._steps
         while self._count < end:
-            if self._count % self._period == 0:
-                self._scan()
-            steps = min(self._period - self._count % self._period, end - self._count)
+            scanned = self._count % self._period == 0
+            if scanned:
+                self.interlock.carry_out(self._controller.scan(self.sensed()))
+            if self._count % self._look == 0:
+                self._move(scanned)
+            left = (every - self._count % every for every in (self._period, self._look))
+            steps = min(*left, end - self._count)
             world.advance(steps)
             self._count += steps
         world.settle()
@@ -121,14 +128,15 @@ class DrivenSupervisor:
         """None: what the controller does is not known before."""
         return ()
 
-    def _scan(self) -> None:
-        """Scan the controller, carry out its permitted commands, and move the drives; robots that
-        the interlock holds stand."""
-        commands = self._controller.scan(self.sensed())
+    def _move(self, scanned: bool) -> None:
+        """Move the drives to the commanded targets as far as they may go; robots that the interlock
+        holds stand. A target is refused when it is `scanned`, if at all."""
         self._trip()
-        self.interlock.carry_out(commands)
+        commands = self.interlock.commands
         drives, back, stops = self.drives, self.interlock.held_back, self.drives.stops
-        target = self._confined(commands)
+        target, astray = self._confined(commands)
+        if scanned:
+            self._tell(astray)
         for axis, where in enumerate(target.tolist()):
             stands = commands.stop or self.tripped or self.factory.robot_of(axis) in back
             drives.target[axis] = stops[axis] if stands else where
@@ -144,19 +152,24 @@ class DrivenSupervisor:
             self.tripped = True
             self.refuse(f"{why}: all axes stand until the plant is started anew")
 
-    def _confined(self, commands: Commands) -> Array:
-        """The targets in their corridors; those that are not are refused once."""
-        interlock, (low, high) = self.interlock, self.corridor()
-        confined = np.clip(commands.target, low, high)
-        astray = {*np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist()}
-        for axis in sorted(astray - self._astray):
+    def _confined(self, commands: Commands) -> tuple[Array, dict[int, str]]:
+        """The targets in their corridors, and what is said of those that are not, by axis."""
+        low, high = self.corridor()
+        confined, astray = np.clip(commands.target, low, high), dict[int, str]()
+        for axis in np.flatnonzero(np.abs(confined - commands.target) > SLACK).tolist():
             robot = self.factory.robot_of(axis)
             name = self.factory.robots[robot].name + (" lift" if axis != robot else "")
             ends = f"between {low[axis]:.3f} m and {high[axis]:.3f} m now"
-            message = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
-            self.interlock.refusals.add(Refusal(interlock.world.time, robot, message))
-        self._astray = astray
-        return confined
+            astray[axis] = f"{name} is sent to {commands.target[axis]:.6g} m: it may go {ends}"
+        return confined, astray
+
+    def _tell(self, astray: dict[int, str]) -> None:
+        """Refuse targets that are not in their corridors, once each."""
+        now = self.interlock.world.time
+        for axis in sorted(astray.keys() - self._astray):
+            refusal = Refusal(now, self.factory.robot_of(axis), astray[axis])
+            self.interlock.refusals.add(refusal)
+        self._astray = {*astray}
 
 
 def drive(simulation: Simulation, controller: Controller, scan: float) -> DrivenSupervisor:

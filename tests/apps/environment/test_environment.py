@@ -15,6 +15,7 @@ gymnasium = pytest.importorskip("gymnasium", reason="the extra `gym` is not inst
 
 from factory.apps.environment.plant import FactoryEnv  # noqa: E402
 from factory.apps.environment.programs import Programs  # noqa: E402
+from factory.apps.plc.corridors import Corridors  # noqa: E402
 
 
 def env_of(name: str, **how: Any) -> FactoryEnv:
@@ -87,19 +88,33 @@ def test_legal_jobs_are_not_refused_and_others_are(seed: int) -> None:
     assert tried[False], "nothing illegal was tried"
 
 
-@pytest.mark.parametrize("name", ["paper", "stool"])
-def test_what_touches_stops_the_plant(name: str) -> None:
-    """By chance, 20 times a second: no two machines meet, and a hand that touches a part while it
-    is moved about under it trips the plant."""
+@pytest.mark.parametrize("name", ["paper", "stool", "gearbox"])
+def test_agents_by_chance_touch_nothing(name: str) -> None:
+    """20 times a second. At the start, robots stand under the parts of their feeders: they were
+    moved about there by any setpoint, since that was not on their way."""
     env = env_of(name, units=3, interval=0.05)
     for seed in range(4):
         env.reset(seed=seed)
         env.action_space.seed(seed)
         for _ in range(100):
             *_, cut_off, info = env.step(env.action_space.sample())
-        touch = env.simulation.world.collision
-        assert info["tripped"] == cut_off == bool(touch)
-        assert not touch or "/pad and part/" in touch
+        assert env.simulation.world.collision == ""
+        assert not info["tripped"] and not cut_off
+
+
+def test_the_plant_looks_every_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However seldom it is commanded: where it looked at each command only, a robot that was home
+    for an instant in between was moved on, and its next part came down on its hand."""
+    env, times, bounds = env_of("paper", interval=0.1), list[float](), Corridors.bounds
+
+    def looked(self: Corridors, *state: Any) -> Any:
+        times.append(env.simulation.world.time)
+        return bounds(self, *state)
+
+    env.reset(seed=0)
+    monkeypatch.setattr(Corridors, "bounds", looked)
+    env.step(env.action_space.sample())
+    assert len({round(time, 3) for time in times}) > 10
 
 
 def test_worlds_are_a_vector() -> None:

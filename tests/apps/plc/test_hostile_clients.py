@@ -263,6 +263,41 @@ def test_a_plant_in_which_a_part_is_dropped_says_that_it_stopped() -> None:
     assert "all axes stand until the plant is started anew" in stop.message
 
 
+def test_a_carrier_stays_for_what_can_no_longer_stop_before_it() -> None:
+    """Its lift was let go down, on its way already, after the carrier had been sent away: the lid
+    came onto a shaft. One that waits at its standoff is let in only while the carrier rests."""
+    layout, request = with_hands("lamp"), RunRequest(units=1)
+    simulation = Simulation(layout, request)
+    corridors = Corridors(layout, simulation.timing.coordinated, simulation.modes)
+    factory, fired = layout.factory, [0] * len(layout.factory.net.threaded.transitions)
+    tried = 0
+    for operation, mode in zip(factory.operations, simulation.modes, strict=True):
+        marked = [0] * len(factory.net.threaded.places)
+        marked[operation.place] = 1
+        axes = [*factory.axes[operation.index]]
+        for slot, gate in enumerate(mode.gate.tolist()):
+            standoff = float(mode.standoff[slot])
+            if gate < 0 or standoff <= 0.0:
+                continue
+            goal, nearest = float(mode.goals[gate]), float(mode.goals[slot]) + standoff
+            x = simulation.world.sense()[0].copy()
+            x[axes] = mode.goals
+            x[axes[slot]] = nearest
+            for after in np.flatnonzero(mode.gate == slot).tolist():  # waits in its turn
+                x[axes[after]] += float(mode.standoff[after])
+            stops = x.copy()
+            for entering, leaving in ((0.0, 0.0), (0.002, 0.0), (0.0, 0.002)):
+                stops[axes[slot]], stops[axes[gate]] = nearest - entering, goal + leaving
+                low, high = corridors.bounds(marked, fired, x, stops)
+                stays = low[axes[gate]] == high[axes[gate]] == pytest.approx(goal)
+                let_in = low[axes[slot]] < nearest - 1e-9
+                assert stays or entering == 0.0
+                assert stays or not let_in, "both may go"
+                assert let_in == (leaving == 0.0)
+                tried += 1
+    assert tried >= 12
+
+
 def test_parts_change_hands_at_rest_only() -> None:
     """A program that gives a job up on its way past the goal is refused."""
     program = text("paper")
