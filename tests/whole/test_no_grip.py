@@ -16,6 +16,7 @@ from factory.floor.layout.hands.misses import NoGrip
 from factory.floor.layout.hands.tips import STRONG
 from factory.pipeline import read
 from tests.command_line import Terminal
+from tests.drawn_products import drawn_product
 from tests.paths import ROOT
 
 GEARBOX = ROOT / "examples" / "gearbox.pag"
@@ -187,3 +188,17 @@ def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
 def test_what_hands_can_hold_is_not_drawn(run: Terminal, out: Path) -> None:
     stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
     assert stool.json["no_grips"] == [] and not list(out.iterdir())
+
+
+@pytest.mark.parametrize("seed", [39608, 87122, 134636, 150474, 213826])
+def test_robots_have_a_hand_unless_it_is_told_before(seed: int, tmp_path: Path) -> None:
+    """A robot was laid out on a side on which no hand can hold what it brings, though there was one
+    on the other, and nothing told it before the run."""
+    project = read(drawn_product(seed).write(tmp_path))
+    layout = project.layout
+    lacking = {
+        robot.name
+        for robot in layout.factory.robots
+        if (hand := layout.hand(robot.index)) is not None and hand.kind == "none"
+    }
+    assert lacking == {no_grip.robot for no_grip in project.no_grips}

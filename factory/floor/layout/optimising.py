@@ -23,9 +23,10 @@ from factory.floor.layout.drafting import LayoutDraft
 from factory.floor.layout.durations import Pace, cycle_of, gear_times
 from factory.floor.layout.guidepath import Box, Point2, hull
 from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.hands.holding import bare
 from factory.floor.layout.layout import Layout, carriers
 from factory.floor.layout.outline import Outline
-from factory.floor.layout.packing import WIDTHS, Packing, Task, bare
+from factory.floor.layout.packing import WIDTHS, Packing, Task
 from factory.floor.layout.shapes import (
     OUTPUT,
     Frame,
@@ -120,8 +121,8 @@ def bounds(occupied: Sequence[Region], clearance: float) -> Box:
 
 
 def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, ...]:
-    """The objective of a layout, smaller is better: excess over the floor [m], number of labels on
-    lines without a hand, `cycle` time [s], guidepaths [m], floor [m²]."""
+    """The objective of a layout, smaller is better: excess over the floor [m], number of labels
+    brought without a hand, `cycle` time [s], guidepaths [m], floor [m²]."""
     excess = 0.0
     if floor is not None:
         xlo, xhi, ylo, yhi = floor_of(layout)

@@ -17,7 +17,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.layout.footprint import Placed, extent_to, footprint
 from factory.floor.layout.guidepath import Extent
 from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.holding import bare
 from factory.floor.layout.layout import BESIDE
 from factory.floor.layout.outline import Choice, Guest, Outline, outlined
 from factory.floor.layout.shapes import Shape, Sides
@@ -36,7 +36,7 @@ ALIGN = 0.05
 """So much further [m] a robot may go to stand where the next operation will be."""
 
 BARE = 5.0
-"""How bad it is that a robot has no hand for what is on its line, where it could lie another way
+"""How bad it is that a robot has no hand for what it brings, where it could lie another way
 [s]."""
 
 WIDTHS = 6, 24
@@ -275,7 +275,7 @@ class Packing:
             ahead = max(max(guest.outline.high) for guest in guests)
             cost += weights[self.robot] * 2 * ahead / pace.speed
         for guest in guests:
-            cost += BARE * bare(self.task.factory, guest.robot, guest.outline.shape.hand)
+            cost += BARE * self._bare(guest)
             cost += tours * weights[guest.robot] * pace.rest(guest.travel)
             cost += PATH * guest.travel / pace.speed
         return cost
@@ -322,14 +322,11 @@ class Packing:
         behind = 0.25 if factory.robots[carrier].operations[0] == last else 1.0
         breadth = task.breadth * (max(outline.high) - behind * min(outline.low))
         ways = weights[carrier] * breadth + PATH * sum(outline.choice.travels.values())
-        return weights[self.robot] * time + ways / pace.speed
+        lacking = BARE * sum(map(self._bare, way.guests))
+        return weights[self.robot] * time + ways / pace.speed + lacking
 
-
-def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
-    """Number of labels that a robot brings without a hand although one hand for several would hold
-    them."""
-    count = len(factory.tours[robot])
-    return count if hand is not None and hand.kind == "none" and count > 1 else 0
+    def _bare(self, guest: Guest) -> int:
+        return bare(self.task.factory, guest.robot, guest.outline.shape.hand)
 
 
 def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: float) -> Guest:

@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import axis_of, fed_of
-from factory.floor.layout.hands.hand import Kind, Point3
+from factory.floor.layout.hands.hand import Hand, Kind, Point3
 from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
 from factory.floor.layout.layout import carriers
@@ -148,3 +148,8 @@ def held(factory: Factory, robot: int, at_last: bool = False) -> str:
         if operation.carrier == robot and not factory.drops(number):
             return operation.label
     return ""
+
+
+def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
+    """Number of labels that a robot brings without a hand."""
+    return len(factory.tours[robot]) if hand is not None and hand.kind == "none" else 0

@@ -11,12 +11,13 @@ import numpy as np
 from factory.floor.layout.hands.apart import Swept
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.hand import Kind
-from factory.floor.layout.hands.holding import held
+from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import IN_THE_WAY
 from factory.floor.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, hit, near
 from factory.floor.layout.hands.tips import STRONG
+from factory.floor.layout.sides import admitted
 from factory.support.arrays import Array, Index, Truth
 
 Frames = tuple[tuple[Way, Way], ...]
@@ -30,11 +31,11 @@ AS_WEAK = 1.5
 
 
 def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
-    """Each sub-assembly that no hand of its robot can hold, in any frame; and for a robot that can
-    hold each of its labels, but not all by one hand, all of them."""
+    """Each sub-assembly that no hand of its robot can hold, in any frame in which it can come; and
+    for a robot that can hold each of its labels, but not all by one hand, all of them."""
     factory, lacking_grips = hands.holding.factory, list[NoGrip]()
     for robot, tours in enumerate(hands.tours.of):
-        frames = hands.holding.frames(tours[0])
+        frames = _frames(hands.holding, tours)
         chosen = [hands.hand(robot, u, t) for u, t in frames]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
             unlike = tuple(dict.fromkeys(hands.tours.alike(tours)))
@@ -46,6 +47,18 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
                 replace(search.found(not lacking), line=labels, ways=ways) for search in searches
             ]
     return tuple(lacking_grips)
+
+
+def _frames(holding: Holding, tours: Sequence[int]) -> list[tuple[Way, Way]]:
+    """The frames of a robot in which its inputs can come from its side of their carriers, the
+    others from the other; all frames where these leave none."""
+    frames, operations = [*holding.frames(tours[0])], [(t, holding.last(t)) for t in tours]
+
+    def admits(u: Way) -> bool:
+        t = -u[0], -u[1]  # it heads against its carrier's side
+        return all(admitted(o, dict.fromkeys(o.robots, -1) | {r: 1}, t) for r, o in operations)
+
+    return [frame for frame in frames if admits(frame[0])] or frames
 
 
 def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[Kind, tuple[str, ...]]]:
