@@ -18,13 +18,16 @@ from factory.api import Array, Layout, Mode
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.presence import Span
-from factory.floor.layout.staying import LATE, Staying, Sweep
+from factory.floor.layout.staying import Staying, Sweep
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3
 """An axis is where it has to be within this [m]."""
 
-SOON = 2 * LATE
+AWAY = 0.005
+"""A robot that is further from its way stays where it is [m]: more than it goes in a tick."""
+
+SOON = 0.01
 """An axis that is let go on by a tick stops so much further at most [m]."""
 
 
@@ -42,8 +45,7 @@ class Corridors:
 
     def __init__(self, layout: Layout, net: Coordinated, modes: Sequence[Mode]) -> None:
         self._factory, self._modes = layout.factory, modes
-        strokes = [layout.strokes[robot] for robot in layout.factory.strokes]
-        self._ends = np.array([*(path.length for path in layout.guidepaths), *strokes])
+        self._least, self._most = np.array(layout.spans).T
         ended = {int(place): past for past, (place, _) in net.passes.items()}
         self._ways = dict[tuple[int, int], list[WayPart]]()
         for presence in Staying(layout, net, awaited_positions(layout)).presences():
@@ -59,13 +61,13 @@ class Corridors:
         `fired`, axes at `x` that can stop at `stops` [m]. A robot that is nowhere on its way stays
         where it is: at the start of a run one stands under the part of its feeder. Remembers the
         passes."""
-        low, high = (np.clip(x, 0.0, self._ends) for _ in range(2))
+        low, high = (np.clip(x, self._least, self._most) for _ in range(2))
         for (robot, place), stretches in self._ways.items():
             if not marked[place]:
                 continue
-            axes = self._factory.axes_of(robot)
+            axes = [*self._factory.axes_of(robot)]
             sweeps = [*self._left(stretches, fired, x)]
-            if min(_off(sweep, x[axes]) for sweep in sweeps) > LATE:
+            if min(_off(sweep, x[axes]) for sweep in sweeps) > AWAY:
                 continue
             for which, axis in enumerate(axes):
                 other = float(x[axes[1 - which]]) if len(axes) == 2 else 0.0

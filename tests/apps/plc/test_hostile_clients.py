@@ -274,7 +274,7 @@ def test_a_carrier_stays_for_what_can_no_longer_stop_before_it() -> None:
     for operation, mode in zip(factory.operations, simulation.modes, strict=True):
         marked = [0] * len(factory.net.threaded.places)
         marked[operation.place] = 1
-        axes = [*factory.axes[operation.index]]
+        axes = [*factory.moves[operation.index]]
         for slot, gate in enumerate(mode.gate.tolist()):
             standoff = float(mode.standoff[slot])
             if gate < 0 or standoff <= 0.0:
