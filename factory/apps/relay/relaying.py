@@ -23,6 +23,7 @@ from factory.api import (
     certify,
     collector_paused,
     load_catalogue,
+    pace,
 )
 from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
@@ -38,6 +39,9 @@ WITHIN = 1.05
 
 GUESS = 0.6
 """At first no piece of a way takes longer than this share of the wanted cycle time."""
+
+MET = 5e-3
+"""A predicted cycle time is no longer than wanted within this [s]."""
 
 WIDENED = 3
 """So often the layout is made anew to have room for relays on guidepaths that got longer."""
@@ -59,12 +63,29 @@ def relayed(
     """A layout with relays, its own net and certificate, for a `cycle` time [s] if one is given, or
     near the least there can be; `plain` itself where no relay makes it faster, or some robot holds
     its labels in several places. `hands`: those to choose from, where they are known. Raises
-    RunError (Layout) where it does not fit the floor."""
+    RunError (Layout) where it does not fit the floor.
+
+    A search goes by lengths alone; where the cycle time that is predicted of what it finds is
+    longer than wanted, it is searched again for one that is as much shorter, then for the least."""
     if plain.factory.folded:
         return plain
     if hands is None and plain.hands:
         hands = Hands(plain.factory, plain.product, settings.acceleration)
     room = Room(plain, Pace.of(settings), floor, hands)
+    found = _relayed(room, settings, cycle)
+    if cycle is None or (late := pace(found, settings)[0].seconds - cycle) <= MET:
+        return found
+    for aim in (cycle - late, None):
+        again = _relayed(room, settings, aim)
+        found = min(found, again, key=lambda layout: pace(layout, settings)[0].seconds)
+        if pace(found, settings)[0].seconds <= cycle + MET:
+            break
+    return found
+
+
+def _relayed(room: Room, settings: Settings, cycle: float | None) -> Layout:
+    """The layout with few relays for a cycle time [s] by lengths alone, certified."""
+    plain = room.plain
     search = _searched(room, room.cuttable(), settings, cycle)
     used = {way.robot for label, way in search.ways.items() if search.numbers[label]}
     again = _searched(room, used, settings, search.cycle)
@@ -72,7 +93,7 @@ def relayed(
         search = again
     if not search.seconds(search.found) < search.seconds(plain):
         return plain
-    return replace(certified(search.found, floor), plain=plain)
+    return replace(certified(search.found, room.floor), plain=plain)
 
 
 @dataclass(frozen=True, slots=True)
