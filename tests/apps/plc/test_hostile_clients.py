@@ -317,12 +317,9 @@ def test_hostile_controllers_do_no_harm() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["paper", "truck", "gearbox", "chest"])
+@pytest.mark.parametrize("name", ["paper", "truck", "gearbox", "chest", "stool", "lamp", "family"])
 def test_many_hostile_controllers_do_no_harm(name: str) -> None:
-    """Contacts are stopped, and refused before that; most runs have none."""
-    harmed = harmed_by(name, range(50), 15.0)
-    assert all(stopped for stopped in harmed.values()), harmed
-    assert len(harmed) <= 2, harmed
+    assert harmed_by(name, range(50), 15.0) == {}
 
 
 def harmed_by(name: str, seeds: Iterable[int], most: float) -> dict[int, bool]:
