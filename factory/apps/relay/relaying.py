@@ -72,15 +72,19 @@ def relayed(
     if hands is None and plain.hands:
         hands = Hands(plain.factory, plain.product, settings.acceleration)
     room = Room(plain, Pace.of(settings), floor, hands)
-    found = _relayed(room, settings, cycle)
-    if cycle is None or (late := pace(found, settings)[0].seconds - cycle) <= MET:
-        return found
-    for aim in (cycle - late, None):
-        again = _relayed(room, settings, aim)
-        found = min(found, again, key=lambda layout: pace(layout, settings)[0].seconds)
-        if pace(found, settings)[0].seconds <= cycle + MET:
+    layout = _relayed(room, settings, cycle)
+    if cycle is None:
+        return layout
+
+    def seconds(one: Layout) -> float:
+        return pace(one, settings)[0].seconds
+
+    late = seconds(layout) - cycle
+    for aim in (cycle - late, None) if late > MET else ():
+        layout = min(layout, _relayed(room, settings, aim), key=seconds)
+        if seconds(layout) <= cycle + MET:
             break
-    return found
+    return layout
 
 
 def _relayed(room: Room, settings: Settings, cycle: float | None) -> Layout:
