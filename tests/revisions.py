@@ -7,13 +7,11 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from factory.apps.revise.inheriting import Inheritance, pairs_of
+from factory.apps.revise.inheriting import Inheritance
 from factory.apps.revise.matching import matching
 from factory.apps.revise.pairing import Pairing
-from factory.apps.revise.pins import SAME
-from factory.floor.layout.certificate import ALWAYS, Certificate
+from factory.floor.layout.exclusions import coordinated
+from factory.floor.layout.layout import Layout
 from factory.pipeline import all_templates
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.problem.pag import PAG, Assembly, Parameter
@@ -117,27 +115,38 @@ def kept_share(pag: PAG, new: PAG) -> Counter[str]:
     return Counter(dict(zip(names, counts, strict=True)))
 
 
-def refuted(
-    mine: Inheritance, old: Certificate, new: Certificate, pairing: Pairing
-) -> Iterator[str]:
-    """What is wrong with an inheritance: an entry that is not in the old certificate, or is of
-    something else. Uses nothing of how it was found."""
-    if not old.holds:
+def refuted(mine: Inheritance, old: Layout, new: Layout, pairing: Pairing) -> Iterator[str]:
+    """What is wrong with an inheritance: an entry that is not in the old certificate, is of other
+    machines, or whose circuit does not keep them apart in the new net. Uses nothing of how it was
+    found."""
+    assert old.certificate is not None and new.certificate is not None
+    if not old.certificate.holds:
         yield "the old certificate does not hold"
-    for number, other in mine.regions.items():
-        if not (0 <= number < len(new.regions) and 0 <= other < len(old.regions)):
-            yield f"entry {number}: there is no such region"
+    before, after = old.certificate.apart.excluded, new.certificate.apart.excluded
+    net, words = coordinated(new).net, dict[str, str]()
+    for a, b in pairing.operations.items():
+        words[pairing.old.operations[a].label] = pairing.new.operations[b].label
+    for a, b in pairing.robots.items():
+        words[pairing.old.robots[a].name] = pairing.new.robots[b].name
+
+    def named(name: str) -> str:
+        parts = (" ".join(words.get(w, w) for w in part.split(" ")) for part in name.split(":"))
+        return ":".join(parts)
+
+    place = {one.name: n for n, one in enumerate(net.net.places)}
+    for number, other in mine.entries.items():
+        if not (0 <= number < len(after) and 0 <= other < len(before)):
+            yield f"entry {number}: there is no such entry"
             continue
-        one, before = new.regions[number], old.regions[other]
-        name = f"entry {number}, {one.label or 'a body'} of {new.robots[one.robot]}"
-        away = np.array(one.box) - before.box - np.repeat(mine.shift, 2)
-        if np.abs(away).max() > SAME or one.z != before.z:
-            yield f"{name}: it is elsewhere than in the old certificate"
-        if (one.layer, one.kind) != (before.layer, before.kind):
-            yield f"{name}: it is of another kind"
-        mode = pairing.operations.get(before.mode, ALWAYS) if before.mode >= 0 else ALWAYS
-        if pairing.robots.get(before.robot) != one.robot or mode != one.mode:
-            yield f"{name}: it is of another robot, or in another mode"
-    kept = [r for n, r in enumerate(new.regions) if n in mine.regions]
-    if (mine.pairs, mine.inherited) != (pairs_of([*new.regions]), pairs_of(kept)):
+        one, its = after[number], before[other]
+        name = f"entry {number}, of {' and '.join(one.machines)}"
+        sides = sorted(zip(map(named, its.machines), map(named, its.places), strict=True))
+        if sides != sorted(zip(one.machines, one.places, strict=True)):
+            yield f"{name}: it is of other machines, or places"
+        circuit = [place.get(named(each), -1) for each in its.circuit]
+        onward = (*circuit[1:], circuit[0])
+        follow = all(net.right[p] == net.left[q] for p, q in zip(circuit, onward, strict=True))
+        if -1 in circuit or not follow or sum(net.tokens[p] for p in circuit) != 1:
+            yield f"{name}: its circuit is none of the new net"
+    if mine.pairs != len(after):
         yield "the pairs are miscounted"

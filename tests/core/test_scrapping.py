@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from factory.floor.layout.clearance import separation
+from factory.floor.layout.crowding import separation
 from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.sweeps import piles
 from tests.examples import with_hands

@@ -21,8 +21,7 @@ from factory.apps.few_robots.sharing import with_branches, with_lines
 from factory.apps.log.plan_file import plan_files, read_plan
 from factory.apps.report import page, recording_of
 from factory.engine.simulation.modelling import physical_model
-from factory.floor.layout import exclusions, request
-from factory.floor.layout.clearance import certify
+from factory.floor.layout import request
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
@@ -432,15 +431,11 @@ def test_a_plan_that_is_not_utf_8_is_told_as_a_pag_is(run: Terminal, tmp_path: P
     assert error["message"] == "byte 0xff is not UTF-8 text" and error["col"] == 13
 
 
-def test_robots_without_a_common_operation_share_floor_where_the_net_keeps_them_apart(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Two carriages of this layout of a family are nearer than the clearance, in places that one
-    circuit with one token goes through; without their circuits it is refused."""
+def test_a_kept_layout_whose_machines_are_too_near_is_refused() -> None:
+    """A tool stands 6 mm beside where a carriage comes past, of a robot with the same carrier."""
     plan = read_plan(TESTS / "data" / "crossing" / "plan.json")
-    layout = plan.project(plan.settings, plan.ground, print).layout
-    assert layout.certificate is not None and layout.certificate.holds
-    (near,) = layout.certificate.crossing
-    assert near.robots == ("r10", "r12")
-    monkeypatch.setattr(exclusions, "_circuits", lambda net, pairs: {})
-    assert near in certify(layout).faults
+    with pytest.raises(InputError, match="BadPlan") as refused:
+        _ = plan.project(plan.settings, plan.ground, print).layout
+    text = str(refused.value)
+    assert "carriage of r10, in r10:nopart/s4t, and carriage of r12, in s4," in text
+    assert "come 13.90 mm nearer than they may" in text

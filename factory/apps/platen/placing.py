@@ -15,7 +15,7 @@ import numpy as np
 from factory.api import Array, Index, Layout, Point2, Truth
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.certificate import STATIONS, Region
-from factory.floor.layout.clearance import TOLERANCE, ClearanceSearch
+from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.layout import carriers
 from factory.floor.layout.sweeps import piles, regions_of
 
@@ -40,7 +40,7 @@ class Floor:
     def __init__(self, layout: Layout) -> None:
         self.layout, self.on = layout, carriers(layout.factory)
         self._piles = piles(layout.factory, layout.product)
-        self._search = ClearanceSearch(layout, [])
+        self._crowding = Crowding(layout)
         self._kinds, self._regions = dict[Region, int](), list[Region]()
         self._may = np.zeros((0, 0), np.int8)
         self._known = dict[tuple[int, Detour | None], Swept]()
@@ -64,9 +64,9 @@ class Floor:
         """By how much the regions of two robots are nearer than they may be [m], the second moved
         by a vector (2,)."""
         a, b = one.boxes[:, None], other.boxes[None] + apart[[0, 0, 1, 1]]
-        least = self.layout.clearance - TOLERANCE
         depth = np.minimum(a[..., 1] - b[..., 0], b[..., 1] - a[..., 0])
-        depth = np.minimum(depth, np.minimum(a[..., 3] - b[..., 2], b[..., 3] - a[..., 2])) + least
+        depth = np.minimum(depth, np.minimum(a[..., 3] - b[..., 2], b[..., 3] - a[..., 2]))
+        depth += self._crowding.least
         i, j = np.nonzero(depth > 0.0)
         if not len(i):
             return 0.0
@@ -86,7 +86,7 @@ class Floor:
             a, b = (self._regions[kind] for kind in pair)
             is_one_robot = a.robot == b.robot and (a.kind in STATIONS) == (b.kind in STATIONS)
             self._may[pair] = self._may[pair[::-1]] = (
-                a.layer != b.layer or is_one_robot or self._search.settled(a, b)
+                a.layer != b.layer or is_one_robot or self._crowding.may_meet(a, b)
             )
         return self._may[one, other] > 0
 

@@ -1,69 +1,76 @@
-"""Inherited entries of a clearance certificate (Theorem 12): what a certificate says of a pair of
-regions depends on these two alone, and on the modes that they are in.
+"""Inherited entries of a clearance certificate (Theorem 12): an entry names a circuit that keeps
+two machines from being near each other at once, and is right wherever they are.
 
-So where both robots of a pair are where they were and hold what they held, what was certified of
-them still holds, word for word; only pairs with a region that is new are computed.
+So where the circuit of an old entry is one of the new net, and still carries one token, the entry
+holds, word for word; only the pairs that come near where none did are new.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from factory.api import Layout, Point2
+from factory.api import Layout, MarkedNet, Point2
 from factory.apps.revise.pairing import Pairing
-from factory.floor.layout.certificate import ALWAYS, Region
+from factory.floor.layout.exclusions import coordinated
 
 
 @dataclass(frozen=True)
 class Inheritance:
-    """Which `regions` of a certificate (index) are which of another's, and how many `pairs` there
-    are of different robots in one layer, of which so many are `inherited`. `shift`: by how much
-    the floor of the new layout lies elsewhere [m]."""
+    """Which `entries` of a certificate (index) are which of another's, of so many `pairs` that come
+    near. `shift`: by how much the floor of the new layout lies elsewhere [m]."""
 
-    regions: Mapping[int, int] = field(repr=False)
+    entries: Mapping[int, int] = field(repr=False)
     pairs: int
-    inherited: int
     shift: Point2
+
+    @property
+    def inherited(self) -> int:
+        """The number of entries that are inherited."""
+        return len(self.entries)
 
     @classmethod
     def of(cls, old: Layout, new: Layout, pairing: Pairing, shift: Point2) -> Inheritance:
         """What the certificate of a layout has from that of another. Both have one."""
         assert old.certificate is not None and new.certificate is not None, "both are certified"
-        named = {_named(r, pairing, shift): n for n, r in enumerate(old.certificate.regions)}
-        mine = [_key(region) for region in new.certificate.regions]
-        regions = {n: named[key] for n, key in enumerate(mine) if key in named}
-        kept = [r for n, r in enumerate(new.certificate.regions) if n in regions]
-        counts = pairs_of([*new.certificate.regions]), pairs_of(kept)
-        return cls(regions, *counts, shift)
+        names, net, held = Renaming(pairing), coordinated(new).net, dict[object, int]()
+        for number, entry in enumerate(old.certificate.apart.excluded):
+            if is_circuit(net, names.of(entry.circuit)):
+                held[_key(names.of(entry.machines), names.of(entry.places))] = number
+        entries = new.certificate.apart.excluded
+        keys = {n: _key(entry.machines, entry.places) for n, entry in enumerate(entries)}
+        return cls({n: held[key] for n, key in keys.items() if key in held}, len(entries), shift)
 
 
-def _key(region: Region) -> tuple[object, ...]:
-    box = tuple(round(value, 6) + 0.0 for value in region.box)
-    return region.robot, region.layer, region.kind, box, region.z, region.label, region.mode
+class Renaming:
+    """The names of machines and places of an old factory, as they are in the new one."""
+
+    def __init__(self, pairing: Pairing) -> None:
+        old, new = pairing.old, pairing.new
+        self._words = {one.label: f"no longer {one.label}" for one in old.operations}
+        self._words |= {one.name: f"no longer {one.name}" for one in old.robots}
+        for one, other in pairing.operations.items():
+            self._words[old.operations[one].label] = new.operations[other].label
+        for one, other in pairing.robots.items():
+            self._words[old.robots[one].name] = new.robots[other].name
+
+    def of(self, names: Iterable[str]) -> tuple[str, ...]:
+        """The new names of some old ones."""
+        words = (re.split("([: ])", name) for name in names)
+        return tuple("".join(self._words.get(word, word) for word in each) for each in words)
 
 
-def _named(region: Region, pairing: Pairing, shift: Point2) -> tuple[object, ...]:
-    """The key of an old region as it would be in the new certificate."""
-    old, new = pairing.old, pairing.new
-    label = region.label
-    if label in old.by_label:
-        number = pairing.operations.get(old.by_label[label].index)
-        label = f"no longer {label}" if number is None else new.operations[number].label
-    moved = np.array(region.box) + np.repeat(shift, 2)
-    box = tuple(round(value, 6) + 0.0 for value in moved.tolist())
-    mode = region.mode if region.mode == ALWAYS else pairing.operations.get(region.mode, -2)
-    robot = pairing.robots.get(region.robot, -1)
-    return robot, region.layer, region.kind, box, region.z, label, mode
+def is_circuit(net: MarkedNet, names: tuple[str, ...]) -> bool:
+    """Whether places of these names follow each other in a circle, which carries one token."""
+    numbers = {place.name: number for number, place in enumerate(net.net.places)}
+    if not names or not numbers.keys() >= {*names}:
+        return False
+    circuit = [numbers[name] for name in names]
+    onward = zip(circuit, (*circuit[1:], circuit[0]), strict=True)
+    follow = all(net.right[here] == net.left[then] for here, then in onward)
+    return follow and sum(net.tokens[place] for place in circuit) == 1
 
 
-def pairs_of(regions: list[Region]) -> int:
-    """How many pairs of regions in one layer are of different robots."""
-    layers = Counter(region.layer for region in regions)
-    robots = Counter((region.layer, region.robot) for region in regions)
-    return sum(n * (n - 1) // 2 for n in layers.values()) - sum(
-        n * (n - 1) // 2 for n in robots.values()
-    )
+def _key(machines: tuple[str, ...], places: tuple[str, ...]) -> object:
+    return frozenset(zip(machines, places, strict=True))

@@ -24,7 +24,7 @@ from factory.api import (
 )
 from factory.apps.revise.pins import Pins
 from factory.floor.layout.certificate import Fault
-from factory.floor.layout.clearance import searched
+from factory.floor.layout.crowding import crowding_faults
 from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
 from factory.floor.layout.drafting import LayoutDraft
 from factory.floor.layout.durations import cycle_of
@@ -291,7 +291,7 @@ class Pinning:
             Stretched([*far], [*stretch.stations], sides),
         )
         layout = draft.layout(self.pins.travel[0])
-        faults = tuple(searched(layout)[1])
+        faults = tuple(crowding_faults(layout))
         lacking = sum(fault.lacking or JAM for fault in faults)
         displaced = len(self.pins.ends) - len(self.pins.in_place(layout)[1])
         score = lacking + WEIGHT * displaced + LENGTH * layout.guidepath_length

@@ -166,8 +166,8 @@ class Revision:
         if self.pinned != self.asked:
             yield f"--pin {self.asked}: no layout found; this is that of --pin {self.pinned}"
         yield (
-            "certificate: of {pairs} pairs of regions {pairs_inherited} are those of the old one,"
-            " word for word; {pairs_computed} computed".format(**document)
+            "certificate: of {pairs} pairs that come near {pairs_inherited} have a circuit of the"
+            " old one, word for word; {pairs_computed} are new".format(**document)
         )
         more = f", {afresh:.3f} s if laid out afresh" if afresh is not None else ""
         yield "cycle {old:.3f} -> {pinned:.3f} s{}".format(more, **document["cycle_time_s"])

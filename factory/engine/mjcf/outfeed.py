@@ -14,9 +14,9 @@ from factory.engine.mjcf.elements import add, add_station
 from factory.engine.mjcf.masks import masks_of, tray_code
 from factory.engine.mjcf.robots import MOTOR, Drive, add_drive
 from factory.engine.mjcf.stops import stops_of, tray_clearance
-from factory.floor.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, TRAY, WALL
+from factory.floor.layout.dimensions import BELT_GAP, PAYLOAD, PLAY, TRAY, WALL
 from factory.floor.layout.layout import Layout, Point2
-from factory.floor.layout.outfeed import dip_of, slot_of, slotted
+from factory.floor.layout.outfeed import BELT, SLIT, dip_of, slot_of, slotted, table
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -28,20 +28,9 @@ engine cannot make out the inertia."""
 SHUTTER_MASS = 0.4
 """Mass of the shed's shutter [kg]."""
 
-BELT = PAYLOAD - BELT_GAP - TRAY
-"""Height of the belt [m]."""
-
-SLIT = 2e-4
-"""Between the shutter when it is down and the belt [m]."""
-
 CRACK = 2e-5
 """Between the shutter and the walls before which it slides [m]: so narrow that no line of sight
 through it gets to a product of less than 0.7 m."""
-
-UPRIGHT, LEG = 0.004, 0.006
-"""Half the widths of the uprights on which the shutter slides, and of the legs [m]."""
-
-Point3 = tuple[float, float, float]
 
 
 def add_outfeed(
@@ -106,42 +95,15 @@ def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive
 
 
 def _add_table(world: Element, layout: Layout) -> None:
-    """The belt on its legs, and the shed's walls, roof and back, with uprights for the shutter."""
+    """What stands of it."""
     xlo, xhi, ylo, yhi = layout.outfeed
-    thick = (BELT - FINGER_TOP) * 0.8
-    (x, y), half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
-    body = add(world, "body", name="outfeed", pos=(x, y, 0.0))
-    mouth, back, low, high = layout.shed
-    mouth += WALL
-    stroke = layout.shutter_stroke
-    top = BELT + SLIT + stroke + WALL
-    length, width = back - mouth - WALL, high - low
-    along, across = mouth + length / 2 - x, (low + high) / 2 - y
-    end = mouth + length + WALL / 2 - x
-    a, slot = layout.guidepaths[0].a, slot_of(layout)
-    if slot is not None:
-        slot = slot[0] + a[0] - x, slot[1] + a[1] - y, slot[2] + a[1] - y
-    belt = -half[0], min(half[0], mouth + length - x - SLIT), -half[1], half[1]
-    for number, (at, rest) in enumerate(slotted(belt, slot), 1):
-        name = "outfeed/belt" + (f"/{number}" if number > 1 else "")
-        place = {"pos": (*at, BELT - thick / 2), "size": (*_plate(*rest), thick / 2)}
-        add_station(body, name, **place, material="belt")
-    shown: list[tuple[str, Point3, Point3]] = [
-        ("roof", (along, across, top - WALL / 2), (length / 2, width / 2 - WALL, WALL / 2)),
-        ("back", (end, across, top / 2), (WALL / 2, width / 2, top / 2)),
-    ]
-    for side in (-1, 1):
-        beside = across + side * (width - WALL) / 2
-        shown.append((f"wall{side}", (along, beside, top / 2), (length / 2, WALL / 2, top / 2)))
-        upright = mouth + UPRIGHT - x, beside, top + stroke / 2
-        shown.append((f"upright{side}", upright, (UPRIGHT, WALL / 2, stroke / 2)))
-    for name, pos, size in shown:
-        add_station(body, f"outfeed/{name}", pos=pos, size=size, material="housing")
-    leg, front = min(LEG, *half), layout.outgoing[1]
-    for side in (-1, 1):
-        foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
-        size = leg, leg, (BELT - thick) / 2
-        add_station(body, f"outfeed/leg{side}", pos=foot, size=size, material="frame")
+    body = add(world, "body", name="outfeed", pos=((xlo + xhi) / 2, (ylo + yhi) / 2, 0.0))
+    for name, pos, (length, width, height) in table(layout):
+        belt, leg = name.startswith("belt"), name.startswith("leg")
+        plan = _plate(length, width) if belt else (length, width)
+        material = "belt" if belt else "frame" if leg else "housing"
+        size = (*plan, height)
+        add_station(body, f"outfeed/{name}", pos=pos, size=size, material=material)
 
 
 def _plate(x: float, y: float) -> Point2:

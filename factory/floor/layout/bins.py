@@ -2,8 +2,8 @@
 
 The carriage passes under the place where its payload is at B, so a bin stands beside its lane, low
 enough for payloads to pass over it. A robot at B opens its hand, and a jet of air blows the payload
-over there. A bin, and the way from hand to bin, keep clear of all regions of the clearance
-certificate. Where there is no room there is no bin.
+over there. A bin, and the way from hand to bin, keep clear of all regions of the layout. Where
+there is no room there is no bin.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import shapely
 from shapely import STRtree
 
 from factory.floor.layout.certificate import BIN_BODY, PAYLOAD_BODY, STATIONS, Region
-from factory.floor.layout.clearance import TOLERANCE, ClearanceSearch, separation
+from factory.floor.layout.crowding import Crowding, separation
 from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
 from factory.floor.layout.guidepath import Box, Point2, hull, moved
 from factory.floor.layout.layout import Layout
@@ -108,7 +108,7 @@ def _placed(layout: Layout, robot: int, held: Held, near: Sequence[Region]) -> B
     """The clear place for a bin that is nearest to B."""
     path, labels = layout.guidepaths[robot], frozenset(label for label, _ in held)
     (ux, uy), (tx, ty) = path.heading, path.side
-    search, boxes = ClearanceSearch(layout, []), [pile.box for _, pile in held]
+    crowding, boxes = Crowding(layout), [pile.box for _, pile in held]
     half = [max(box[k + 1] - box[k] for box in boxes) / 2 + SLACK + PLATE for k in (0, 2)]
     xlo, xhi, ylo, yhi = hull(boxes)
     x, y = (xlo + xhi) / 2, (ylo + yhi) / 2
@@ -119,17 +119,17 @@ def _placed(layout: Layout, robot: int, held: Held, near: Sequence[Region]) -> B
         box = at[0] - half[0], at[0] + half[0], at[1] - half[1], at[1] + half[1]
         one = Bin(robot, box, labels, (-side * tx, -side * ty))
         mine = [*_stands(one), *_flights(one, held)]
-        if not any(_meet(search, a, b) for a in mine for b in near if a.layer == b.layer):
+        if not any(_meet(crowding, a, b) for a in mine for b in near if a.layer == b.layer):
             return one
     return None
 
 
-def _meet(search: ClearanceSearch, one: Region, other: Region) -> bool:
-    """Whether two regions of one layer are nearer than the certificate allows."""
+def _meet(crowding: Crowding, one: Region, other: Region) -> bool:
+    """Whether two regions of one layer are nearer than they may be."""
     is_own = one.robot == other.robot and (one.kind in STATIONS) == (other.kind in STATIONS)
-    if is_own or separation(one.box, other.box) >= search.layout.clearance - TOLERANCE:
+    if is_own or separation(one.box, other.box) >= crowding.least:
         return False
-    return not search.settled(one, other)
+    return not crowding.may_meet(one, other)
 
 
 def _reached(layout: Layout, held: Held) -> tuple[float, float, float, float]:

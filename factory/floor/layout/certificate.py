@@ -1,12 +1,12 @@
-"""The clearance certificate of a layout, as a value: the regions compared, the pairs that share
-floor, and the faults."""
+"""The clearance certificate of a layout, as a value: the floor that machines take, what keeps those
+apart that come near each other, and the faults."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
 from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.guidepath import Box, Point2
+from factory.floor.layout.guidepath import Box
 from factory.support.errors import Diagnostic, Position
 from factory.support.showing import Told
 from factory.theory.nets.coordinated import Past
@@ -62,14 +62,12 @@ class Region:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """A violation of the certificate: the robots, the labels they carry, the distance `lacking`
-    [m], the layer ("" for the guidepaths themselves), and the position in the user's file."""
+    """A violation of the certificate: the robots, the distance `lacking` [m], and the positions in
+    the user's file."""
 
     message: str
     robots: tuple[str, ...]
-    labels: tuple[str, ...] = ()
     lacking: float = 0.0
-    layer: str = ""
     positions: tuple[Position | None, ...] = ()
 
     def diagnostic(self) -> Diagnostic:
@@ -84,45 +82,16 @@ class Fault:
         return {
             "message": self.message,
             "robots": list(self.robots),
-            "labels": list(self.labels),
             "lacking_mm": round(self.lacking * MILLI, 3),
-            "layer": self.layer,
             "positions": [None if p is None else str(p) for p in self.positions],
         }
 
 
-def fault(factory: Factory, message: str, *machines: Region | int, lacking: float = 0.0) -> Fault:
-    """A fault of robots, each given by a region in which it is or by its number."""
-    regions = [region for region in machines if isinstance(region, Region)]
-    numbers = (region.robot if isinstance(region, Region) else region for region in machines)
-    robots = [factory.robots[number] for number in numbers]
-    return Fault(
-        message,
-        tuple(robot.name for robot in robots),
-        tuple(dict.fromkeys(region.label for region in regions if region.label)),
-        lacking,
-        NAMES[regions[0].layer] if regions else "",
-        tuple(robot.position for robot in robots),
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class Shared:
-    """Two robots whose regions meet, and why the robots do not: `operations` are the modes in which
-    they are there, and `point` the junction. One operation: both are in that mode, which joins
-    their payloads. Two: the modes have a robot in common, which can be in one of them only."""
-
-    robots: tuple[str, str]
-    operations: tuple[str, ...]
-    point: Point2
-
-    def as_json(self) -> dict[str, object]:
-        """The pair as the certificate's document lists it."""
-        return {
-            "robots": list(self.robots),
-            "operations": list(self.operations),
-            "point": [round(v, 6) for v in self.point],
-        }
+def fault(factory: Factory, message: str, *robots: int, lacking: float = 0.0) -> Fault:
+    """A fault of robots (index)."""
+    named = [factory.robots[robot] for robot in robots]
+    names, positions = (robot.name for robot in named), (robot.position for robot in named)
+    return Fault(message, tuple(names), lacking, tuple(positions))
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,21 +145,19 @@ class Exclusions:
 
 @dataclass(frozen=True, slots=True)
 class Certificate(Told):
-    """The certificate that robots which no mode couples cannot touch, nor their payloads.
+    """The certificate that machines cannot touch, nor what they hold.
 
     Attributes:
-        clearance: least distance in plan between uncoupled regions of different robots in one layer
-            [m]. End stops are beyond the regions by less than half of that.
+        clearance: least distance between bodies of different machines in one layer, except between
+            what one holds and another that works with it [m]. End stops are beyond the regions by
+            less than half of that.
         layers: name and z range of each layer [m].
         gaps: vertical distance of each layer to the one below [m].
         robots: their names.
         operations: their labels.
         regions: floor that each body covers in each operation.
-        shared: coupled regions that are nearer to another robot's, each with its junction.
-        faults: regions and pairs for which it fails; at most `clearance.MOST`.
-        pairs: number of pairs that were compared.
+        faults: what it fails for; at most `clearance.MOST` of each kind.
         apart: what keeps machines apart that come near each other.
-        crossing: robots that share floor without a common operation, as faults but for `apart`.
 
     It holds if there is no fault.
     """
@@ -201,15 +168,12 @@ class Certificate(Told):
     robots: tuple[str, ...] = field(repr=False)
     operations: tuple[str, ...] = field(repr=False)
     regions: tuple[Region, ...] = field(repr=False)
-    shared: tuple[Shared, ...] = field(repr=False)
     faults: tuple[Fault, ...] = ()
-    pairs: int = 0
     apart: Exclusions = field(default_factory=Exclusions, repr=False)
-    crossing: tuple[Fault, ...] = field(default=(), repr=False)
 
     def __repr__(self) -> str:
         result = "holds" if self.holds else f"FAILS with {len(self.faults)} faults"
-        what = f"{len(self.robots)} robots, {self.pairs} pairs of regions"
+        what = f"{len(self.robots)} robots, {len(self.apart.excluded)} pairs that come near"
         return f"<Certificate: {result}, {what}, clearance {1e3 * self.clearance:g} mm>"
 
     @property
@@ -225,7 +189,7 @@ class Certificate(Told):
     def as_json(self) -> dict[str, object]:
         """The certificate as a document that another program can check."""
         return {
-            "schema": 1,
+            "schema": 2,
             "holds": self.holds,
             "clearance_m": self.clearance,
             "stops_beyond_m": round(Clearance(self.clearance).stop, 6),
@@ -235,20 +199,18 @@ class Certificate(Told):
             ],
             "vertical_gaps_m": {name: round(gap, 6) for name, gap in self.gaps},
             "regions": [self._region(region) for region in self.regions],
-            "shared": [shared.as_json() for shared in self.shared],
             "excluded": [excluded.as_json() for excluded in self.apart.excluded],
             "orders": [order.as_json() for order in self.apart.orders],
             "faults": [fault.as_json() for fault in self.faults],
         }
 
     def summary(self) -> dict[str, object]:
-        """Its figures: whether it holds, the clearance [m], the number of regions compared and of
-        pairs of robots that share a junction."""
+        """Its figures: whether it holds, the clearance [m], and the number of regions and of pairs
+        that come near."""
         return {
             "holds": self.holds,
             "clearance_m": self.clearance,
             "regions": len(self.regions),
-            "shared": len(self.shared),
             "excluded": len(self.apart.excluded),
         }
 

@@ -92,7 +92,7 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
     """Least travels of robots, so that what waits with its payload at a point of delivery is clear
     of all that passes: of two robots that are too near, the one that needs less [m]."""
     carried, travels = [r for r in certificate.regions if r.kind in LOADS], dict[int, float]()
-    for fault in {*certificate.faults, *certificate.crossing}:
+    for fault in certificate.faults:
         pair = [r.index for r in layout.factory.robots if r.name in fault.robots]
         ways = list[tuple[float, int]]()
         stem = len(pair) == 2 and layout.share_stem(*pair)

@@ -3,13 +3,12 @@ are never in both at once.
 
 Either a circuit of the net with one token goes through both places, or order places are added, in
 the order in which a single unit is made. A pair that is marked together while a single unit is made
-is a fault: a machine stands, or holds something, where another has to pass. So is a pair of robots
-whose hands collide at the end of their common operation.
+is a fault: a machine stands, or holds something, where another has to pass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from heapq import heapify, heappop, heappush
 from itertools import product
@@ -28,9 +27,8 @@ from factory.floor.layout.hands.leaving import before_next, farther, gone_by, ho
 from factory.floor.layout.homeward import Homeward
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
-from factory.floor.layout.nearness import Near, near, nearer, nearest
+from factory.floor.layout.nearness import Near, near
 from factory.floor.layout.presence import Presence
-from factory.floor.layout.staying import Staying
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, overlap, times
@@ -74,6 +72,17 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
     """The operations (index) before which robots always go to where they are awaited."""
     return [(tour[0], r) for r in awaited_positions(layout) for tour in layout.factory.tours[r]]
+
+
+def too_near(layout: Layout, robots: Collection[int]) -> set[int]:
+    """Of robots that go ahead while they wait, those that would come near another machine there and
+    that no circuit keeps from it."""
+    net, paths, homeward = coordinated(layout), layout.guidepaths, Homeward(layout)
+    awaited = awaited_positions(layout) | {robot: paths[robot].length for robot in robots}
+    pairs = dict(enumerate(near([*presences(layout, net, awaited)], layout.clearance)))
+    apart = _circuits(net.net, pairs)
+    faults = (pair for n, pair in pairs.items() if n not in apart and homeward.nearer(pair))
+    return {*robots}.intersection(side.robot for p in faults for side in (p.one, p.other))
 
 
 def crowded(layout: Layout, certificate: Certificate) -> dict[int, float]:
@@ -135,25 +144,8 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
         orders,
         tuple(passes),
         tuple(backs.items()),
-        (
-            *(_fault(layout, net.net, p) for n, p in needed.items() if n not in circuits),
-            *_met(layout, Staying(layout, net, backs)),
-        ),
+        tuple(_fault(layout, net.net, p) for n, p in needed.items() if n not in circuits),
     )
-
-
-def _met(layout: Layout, robots: Staying) -> Iterator[Fault]:
-    """Pairs of robots that collide at the end of a common operation."""
-    for one, other in robots.ends():
-        boxed = nearest(one, other, layout.clearance)
-        if boxed is not None and (pair := nearer(boxed, layout.clearance)) is not None:
-            (operation,) = (o for o in layout.factory.making if o.place == one.places[0])
-            message = (
-                f"{pair.bodies[0]} of {one.machine} and {pair.bodies[1]} of {other.machine} come"
-                f" {pair.lacking * MILLI:.2f} mm nearer than they may at the end of"
-                f" '{operation.label}'"
-            )
-            yield fault(layout.factory, message, one.robot, other.robot, lacking=pair.lacking)
 
 
 def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
@@ -199,8 +191,8 @@ def _circuits(net: MarkedNet, pairs: Mapping[int, Near]) -> dict[int, Circuit]:
 
 
 def _places(pair: Near) -> Iterable[Pair]:
-    """One place of each presence of a pair."""
-    return product(pair.one.places, pair.other.places)
+    """One place of each presence of a pair, but for a place of both."""
+    return ((p, q) for p, q in product(pair.one.places, pair.other.places) if p != q)
 
 
 def one_unit(net: MarkedNet, factory: Factory) -> list[int]:
@@ -243,7 +235,7 @@ def _starts(net: CoordinatedNet, factory: Factory) -> Mapping[int, int]:
 
 
 def _excluded(net: MarkedNet, pair: Near, circuit: Circuit) -> Excluded:
-    both = tuple(next(p for p in side.places if p in circuit) for side in (pair.one, pair.other))
+    both = next(both for both in _places(pair) if {*both} <= {*circuit})
     names = [net.net.places[place].name for place in both]
     return Excluded(
         (pair.one.machine, pair.other.machine),

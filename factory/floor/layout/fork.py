@@ -11,14 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import permutations
 from types import MappingProxyType
 
-import numpy as np
-
 from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, LOADS, MAST_BODY
-from factory.floor.layout.clearance import TOLERANCE, ClearanceSearch, searched, separation
+from factory.floor.layout.certificate import (
+    ALWAYS,
+    ARM_BODY,
+    CARRIAGE_BODY,
+    MAST_BODY,
+)
+from factory.floor.layout.clearance import certify
 from factory.floor.layout.dimensions import ARMS, CARRIAGES, up
 from factory.floor.layout.guidepath import Extent
 from factory.floor.layout.hands.leaving import SPARE
@@ -27,13 +29,10 @@ from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.way import Bend
 from factory.support.errors import Diagnostic, RunError
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.robot_bodies import ARM_WIDTH, MAST
+from factory.theory.problem.robot_bodies import MAST
 
 OUT = 0.02
 """Step by which a fork is moved outwards where something is in its way [m]."""
-
-ALONG = 1e-3
-"""Step by which a robot is followed on its way [m]."""
 
 MOST = 40
 """Most such steps."""
@@ -76,21 +75,16 @@ def forked(
     on, made = carriers(stems.factory), _Making(stems, factory, place, rounding)
     twice = {robot for robot in place if place.count(robot) > 1}
     tees = sorted(robot for robot in twice if on[robot] not in twice)
-    forks, pairs = dict[int, Fork](), list[set[str]]()
+    forks = dict[int, Fork]()
     for number, robot in enumerate(tees):
         later = {member for tee in tees[number + 1 :] for member in branch_of(on, tee)}
         names = {factory.robots[r].name for r, at in enumerate(place) if at in later}
-        pairs.append({factory.robots[r].name for r, at in enumerate(place) if at == robot})
         for fork in _forks(stems, robot, rounding, arms.get(robot, 0.0)):
-            search, faults = searched(made.layout({**forks, robot: fork}))
-            shared = [fault for fault in search.crossing if {*fault.robots} in pairs]
-            faults = [f for f in faults if names.isdisjoint(f.robots) and f not in shared]
-            passed = _is_passed_near(search, pairs[-1]) or _stands_in_the_way(search, pairs[-1])
-            faults += shared if passed else []
-            if faults:
-                continue
-            forks[robot] = fork
-            break
+            certificate = certify(made.layout({**forks, robot: fork}))
+            faults = [fault for fault in certificate.faults if names.isdisjoint(fault.robots)]
+            if not faults:
+                forks[robot] = fork
+                break
         else:
             message = f"there is no room for a second arm: {faults[0].message}"
             position = stems.factory.robots[robot].position
@@ -132,46 +126,6 @@ class _Making:
             hands=tuple(hands[at] for at in self.place) if hands else (),
             certificate=None,
         )
-
-
-def _is_passed_near(search: ClearanceSearch, pair: set[str]) -> bool:
-    """Whether the payload of one robot of a pair, where it waits, is in the other's way."""
-    robots, least = search.layout.factory.robots, search.layout.clearance - TOLERANCE
-    loads = [r for r in search.swept if r.kind in LOADS and robots[r.robot].name in pair]
-    return any(
-        separation(one.box, other.box) < least
-        for one in loads
-        for other in loads
-        if one.mode == ALWAYS and one.robot != other.robot
-    )
-
-
-def _stands_in_the_way(search: ClearanceSearch, pair: set[str]) -> bool:
-    """Whether a robot of a pair, at its home, stands in the other's way."""
-    layout, least = search.layout, search.layout.clearance - TOLERANCE
-    robots = [robot.index for robot in layout.factory.robots if robot.name in pair]
-    for one, other in permutations(robots, 2):
-        home, way = layout.guidepaths[one], layout.guidepaths[other]
-        passes = [way.carriage(x) for x in np.arange(0.0, way.length, ALONG).tolist()]
-        mine, others = _feet(layout, one), _feet(layout, other)
-        for foot, layer in mine:
-            box = home.world(foot, home.carriage(home.length - SPARE))
-            for each, its in others:
-                near = (separation(box, way.world(each, at)) < least for at in passes)
-                if its == layer and any(near):
-                    return True
-    return False
-
-
-def _feet(layout: Layout, robot: int) -> list[tuple[Extent, int]]:
-    """Carriage, mast and arm of a robot about its carriage, with their layers."""
-    path, half, mast = layout.guidepaths[robot], layout.factory.carriage / 2, MAST / 2
-    arm = (0.0, max(path.reach - path.arm, 0.0), -ARM_WIDTH / 2, ARM_WIDTH / 2)
-    return [
-        ((-half, half, -half, half), CARRIAGES),
-        ((-mast, mast, -mast, mast), ARMS),
-        (arm, ARMS),
-    ]
 
 
 def _forks(layout: Layout, robot: int, rounding: float, longer: float) -> Iterator[Fork]:

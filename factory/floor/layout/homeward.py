@@ -11,8 +11,9 @@ from factory.floor.layout.coordinating import HOME
 from factory.floor.layout.hands.leaving import SPARE
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.nearness import Near, Nearness, alike, judged
+from factory.floor.layout.nearness import Near, Nearness, alike, distances, judged
 from factory.floor.layout.presence import Presence
+from factory.floor.layout.staying import goes_home
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import marked_after
 from factory.theory.nets.marked import MarkedNet
@@ -48,13 +49,17 @@ class Homeward(Nearness):
 
     def _cut(self, one: Presence, other: Presence) -> Past | None:
         """The pass at which a robot that goes home becomes clear of another machine; None if it
-        never does, or always is."""
+        never does, or always is, or does not go so far by itself."""
         begin = self._layout.visits[operation_of(one.since), one.robot].at
         pair = one.robot, other.robot, begin, alike(one, other)
         if pair not in self._cuts:
             self._cuts[pair] = self._bisected(one, other, begin)
-        at = self._cuts[pair]
-        return None if at is None else _pass(one, at)
+        at, layout = self._cuts[pair], self._layout
+        if at is None:
+            return None
+        then = layout.factory.after(one.robot, operation_of(one.since))
+        far = layout.visits[then, one.robot].at
+        return _pass(one, at) if goes_home(layout, one.robot, then) or at <= far else None
 
     def _bisected(self, one: Presence, other: Presence, begin: float) -> float | None:
         robot, layout = one.robot, self._layout
@@ -66,7 +71,8 @@ class Homeward(Nearness):
 
         def clear(at: float) -> bool:
             there = replace(one, sweeps=(((at, home), (low, high)),))
-            return judged(*self._on_stem(there, other), layout.clearance) is None
+            there, its = self._on_stem(there, other)
+            return judged(there, its, distances(there, its, layout.clearance)) is None
 
         short, far = begin, home - SPARE
         if not layout.guidepaths[robot].travels or begin >= home or not clear(far) or clear(short):

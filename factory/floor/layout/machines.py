@@ -1,21 +1,30 @@
 """Where all machines of a layout are while places of its coordinated net are marked: robots,
-magazines, the outfeed's tray, and the fixed housings of magazines."""
+magazines and the outfeed's tray; and what stands, the housings of magazines and the outfeed."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from factory.floor.layout.coordinating import Coordinated
-from factory.floor.layout.dimensions import BELT_GAP, BOOM_HEIGHT, PAD, PAYLOAD, TRAY, WALL
-from factory.floor.layout.feeding import Outlet, outlets_of
+from factory.floor.layout.dimensions import (
+    BELT_GAP,
+    BOOM_HEIGHT,
+    PAD,
+    PAYLOAD,
+    PAYLOADS,
+    TRAY,
+    WALL,
+)
+from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
 from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.outfeed import dip_of, slot_of, slotted
-from factory.floor.layout.presence import STILL, UP, MachineBodies, Presence, boxed
-from factory.floor.layout.staying import Staying, in_world, upright
+from factory.floor.layout.outfeed import dip_of, slot_of, slotted, table
+from factory.floor.layout.presence import ANY, STILL, UP, MachineBodies, Presence, boxed
+from factory.floor.layout.staying import Staying, in_world, station, upright
 from factory.support.arrays import Array
 
 
@@ -27,6 +36,7 @@ def presences(
     yield from robots.presences()
     yield from magazines(layout, coordinated, robots)
     yield from _tray(layout, coordinated, robots)
+    yield _outfeed(layout)
 
 
 def magazines(
@@ -37,6 +47,7 @@ def magazines(
     hanging, housed = Hanging.of(layout), set[int]()
     outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
     carrier = [o.carrier for o in layout.factory.operations]
+    of = {line[0].robot: [each.leaf.index for each in line] for line in lines_of(layout) if line}
     follows = {served.before: served for served in coordinated.served.values()}
     for number, served in coordinated.served.items():
         leaf = layout.factory.operations[number]
@@ -44,7 +55,7 @@ def magazines(
         slider = hanging.slider[leaf.label]
         pad = _pad(hanging, outlets[slider], slider, hanging.raised[leaf.label])
         part = robots.held(robot, number, leaf.label)
-        visit, partners = layout.visits[number, robot], robots.partners[robot]
+        visit, partners = layout.visits[number, robot], frozenset(map(station, of[robot]))
         hung = pad + part.at(visit.at, visit.lift).going(UP)
         machine = f"magazine of {layout.factory.robots[robot].name}"
         way = ((0.0, outlet.feeder.stroke), (0.0, 0.0))
@@ -87,8 +98,28 @@ def _housing(outlet: Outlet, machine: str, partners: frozenset[int]) -> Presence
         _upright((xlo, xhi, yhi - WALL, yhi), low, high),
     ]
     names = ("post", "boom", "lid", "wall", "wall", "wall", "wall")
-    bodies = boxed(names, np.array(boxes), np.zeros(3))
-    return Presence(outlet.robot, machine, (), bodies, (STILL,), partners)
+    return Presence(outlet.robot, machine, (), _standing(names, boxes), partners=partners)
+
+
+def _outfeed(layout: Layout) -> Presence:
+    """The belt and the shed."""
+    xlo, xhi, ylo, yhi = layout.outfeed
+    middle = np.array([(xlo + xhi) / 2, (ylo + yhi) / 2, 0.0])
+    slabs = [(name, middle + at, np.array(half)) for name, at, half in table(layout)]
+    names, boxes = tuple(name for name, *_ in slabs), [[a - b, a + b] for _, a, b in slabs]
+    return Presence(0, "outfeed", (), _standing(names, boxes), partners=_takes(layout))
+
+
+def _takes(layout: Layout) -> frozenset[int]:
+    """The partners of what takes the products."""
+    return frozenset(station(dropoff.index) for dropoff in layout.factory.dropoffs)
+
+
+def _standing(names: tuple[str, ...], boxes: Sequence[object]) -> MachineBodies:
+    """Boxes that stand: in all layers from the floor up, or among the payloads."""
+    ends = np.array(boxes)
+    layers = np.where(ends[:, 0, 2] > 0.0, PAYLOADS, ANY)
+    return replace(boxed(names, ends, np.zeros(3)), layers=layers)
 
 
 def _upright(box: Box, low: float, high: float) -> Array:
@@ -108,7 +139,7 @@ def _tray(layout: Layout, coordinated: Coordinated, robots: Staying) -> Iterator
         ]
     )
     along = np.array([1.0, 0.0, 0.0])
-    tray, partners = boxed(("tray",) * len(boxes), boxes, along), robots.partners[0]
+    tray, partners = boxed(("tray",) * len(boxes), boxes, along), _takes(layout)
     for number, place in coordinated.away.items():
         product = robots.held(0, number, layout.factory.operations[number].inputs[0])
         visit, way = layout.visits[number, 0], ((0.0, layout.outfeed_way), (0.0, 0.0))

@@ -1,7 +1,9 @@
 """Which machines of a layout come near each other.
 
-Two presences of different machines are *near* where bodies of both come closer than drives and
-grips need, and both are not one and the same mode, whose field keeps its robots apart.
+Two presences of different machines are *near* where bodies of both come closer than they may: to
+the clearance in one layer, and to what drives and grips need in different ones, or where something
+is handed over. In a place of both, which is a mode, its field keeps payloads apart, and only what
+is below them can be near.
 """
 
 from __future__ import annotations
@@ -14,13 +16,17 @@ import numpy as np
 import shapely
 
 from factory.floor.layout.crossings import near as near_boxes
+from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.presence import ACROSS, ALONG, ANY, ROUNDING, Presence
 from factory.floor.mating.depth import exact, rough
-from factory.support.arrays import Array, Index, Indices, Truth
+from factory.support.arrays import Array, Index, Indices
 
 BLOCK = 1 << 14
 """Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of
 presences."""
+
+Distances = tuple[float, float, float]
+"""What bodies need [m]: in one layer below payloads, among payloads, and in different layers."""
 
 Lacking = tuple[float, int, int]
 """By how much nearer than they may two boxes come [m], and their numbers."""
@@ -38,9 +44,8 @@ class Near:
 
 
 def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
-    """The pairs of presences of different machines without a common place that come near: nearer
-    than ACROSS, or than the clearance [m] where bodies are in one layer and their machines do not
-    work together. Near linear."""
+    """The pairs of presences of different machines that come near, which keep a clearance [m]. Near
+    linear."""
     hulls = np.array([presence.hull for presence in presences]).reshape(-1, 2, 3)
     machine = np.unique([presence.machine for presence in presences], return_inverse=True)[1]
     count = np.array([len(presence.boxes) for presence in presences])
@@ -48,12 +53,11 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
     for first, second in near_boxes(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])):
         meets = (low[first] < high[second]).all(axis=1) & (low[second] < high[first]).all(axis=1)
         meets &= machine[first] != machine[second]
-        pairs = zip(first[meets].tolist(), second[meets].tolist(), strict=True)
-        apart = np.array([(i, j) for i, j in pairs if presences[i].is_apart(presences[j])])
-        if not len(apart):
+        pairs = np.stack([first[meets], second[meets]], axis=1)
+        if not len(pairs):
             continue
-        block = np.cumsum(count[apart].sum(axis=1)) // BLOCK
-        for some in np.split(apart, np.flatnonzero(np.diff(block)) + 1):
+        block = np.cumsum(count[pairs].sum(axis=1)) // BLOCK
+        for some in np.split(pairs, np.flatnonzero(np.diff(block)) + 1):
             which, numbers = np.unique(some, return_inverse=True)
             boxes = _Boxes([presences[n] for n in which.tolist()], hulls[which])
             yield from boxes.nearest(numbers.reshape(-1, 2), clearance)
@@ -70,16 +74,15 @@ class _Boxes:
         self._first = np.cumsum(self._count) - self._count
 
     def nearest(self, pairs: Indices, clearance: float) -> Iterator[Near]:
-        """As `nearest`, for those of some pairs (n, 2) of presences that come too near."""
+        """Those of some pairs (n, 2) of presences that come too near, by their boxes."""
         both = [(self._presences[i], self._presences[j]) for i, j in pairs.tolist()]
-        across, apart = np.array([_needed(*pair, clearance) for pair in both]).T
-        first, second = pairs.T
-        here = self._within(first, self._hulls[second], apart)
-        there = self._within(second, self._hulls[first], apart)
+        needed = np.array([distances(*pair, clearance) for pair in both])
+        (first, second), most = pairs.T, needed.max(axis=1)
+        here = self._within(first, self._hulls[second], most)
+        there = self._within(second, self._hulls[first], most)
         for pair, one, other in _combined(here, there, len(pairs)):
-            alike = self._alike(one, other)
             lacking = _overlap(self._boxes[one], self._boxes[other])
-            lacking += np.where(alike, apart[pair], across[pair])
+            lacking += needed[pair, _meeting(self._layers[one], self._layers[other])]
             order = np.lexsort((other, one, lacking, pair))
             order = order[lacking[order] > ROUNDING]
             is_last = np.append(np.diff(pair[order]) > 0, True)[: len(order)]
@@ -87,11 +90,6 @@ class _Boxes:
                 mine, others = both[pair[n]]
                 i, j = one[n] - self._first[first[pair[n]]], other[n] - self._first[second[pair[n]]]
                 yield Near(mine, others, (mine.name(i), others.name(j)), float(lacking[n]))
-
-    def _alike(self, one: Index, other: Index) -> Truth:
-        """Whether boxes (n,) are in one layer with others (n,)."""
-        layer, beside = self._layers[one], self._layers[other]
-        return np.asarray((layer == beside) | (layer == ANY) | (beside == ANY))
 
     def _within(self, which: Index, hulls: Array, apart: Array) -> tuple[Index, Index]:
         """The boxes of presences (n,) that come nearer than distances (n,) to other hulls (n, 2,
@@ -124,49 +122,35 @@ def _spans(first: Index, count: Index) -> tuple[Index, Index]:
     return span, np.arange(len(span)) + (first - np.cumsum(count) + count)[span]
 
 
-def nearest(one: Presence, other: Presence, clearance: float) -> Near | None:
-    """Two presences with the bodies whose boxes come nearest, relative to the distance they need,
-    if any come too near."""
-    pairs = _pairs(one, other, clearance)
-    lacking, i, j = max(pairs, default=(0.0, 0, 0))
-    return Near(one, other, (one.name(i), other.name(j)), lacking) if pairs else None
-
-
-def nearer(near: Near, clearance: float) -> Near | None:
-    """The same, judged by the bodies themselves, which may be apart where their boxes are not."""
-    lacking = judged(near.one, near.other, clearance)
-    return lacking and _named(near, lacking)
-
-
 class Nearness:
-    """Judges pairs of presences as `nearer`, each only once for all that are alike: in the turns of
-    a period, and in the rounds of a search."""
+    """Judges pairs of presences by the bodies themselves, which may be apart where their boxes are
+    not; each only once for all that are alike: in the turns of a period, and in the rounds of a
+    search."""
 
     def __init__(self, clearance: float) -> None:
         self._clearance, self._known = clearance, dict[Hashable, Lacking | None]()
 
     def nearer(self, near_pair: Near) -> Near | None:
-        """The pair as `nearer` judges it."""
+        """The pair by its bodies, None if they are far enough apart."""
         if (pair := alike(near_pair.one, near_pair.other)) not in self._known:
-            self._known[pair] = judged(near_pair.one, near_pair.other, self._clearance)
-        lacking = self._known[pair]
-        return lacking and _named(near_pair, lacking)
+            needed = distances(near_pair.one, near_pair.other, self._clearance)
+            self._known[pair] = judged(near_pair.one, near_pair.other, needed)
+        if (nearest := self._known[pair]) is None:
+            return None
+        lacking, i, j = nearest
+        bodies = near_pair.one.name(i), near_pair.other.name(j)
+        return replace(near_pair, bodies=bodies, lacking=lacking)
 
 
 def alike(one: Presence, other: Presence) -> Hashable:
     """A key of two presences: pairs with equal keys come near alike."""
-    apart = one.partners.isdisjoint(other.partners)
-    return one.filled, other.filled, apart, one.bears or other.bears
+    return one.filled, other.filled, distances(one, other, 1.0)
 
 
-def _named(pair: Near, by: Lacking) -> Near:
-    lacking, i, j = by
-    return replace(pair, bodies=(pair.one.name(i), pair.other.name(j)), lacking=lacking)
-
-
-def judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
-    """The bodies that come too near, and by how much; edges count only if faces do not decide."""
-    for lacking, i, j in sorted(_pairs(one, other, clearance), reverse=True):
+def judged(one: Presence, other: Presence, needed: Distances) -> Lacking | None:
+    """The bodies that come nearer than the `needed` distances, and by how much; edges count only if
+    faces do not decide."""
+    for lacking, i, j in sorted(_pairs(one, other, needed), reverse=True):
         need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
         solids = one.solid(i), other.solid(j)
         if need + float(rough(*solids).bounds.min()) <= ROUNDING:
@@ -176,24 +160,33 @@ def judged(one: Presence, other: Presence, clearance: float) -> Lacking | None:
     return None
 
 
-def _needed(one: Presence, other: Presence, clearance: float) -> tuple[float, float]:
-    """The distances that bodies of two presences need: in different layers, and in one [m]."""
-    across = 0.0 if one.bears or other.bears else ACROSS
+def distances(one: Presence, other: Presence, clearance: float) -> Distances:
+    """What bodies of two presences need, of the machines that keep a clearance [m]. Who works with
+    a machine comes to what that holds with an empty hand, or bears what it hands over."""
+    apart = clearance - 2 * (ALONG + ROUNDING)
+    if not one.is_apart(other):
+        return apart, -np.inf, -np.inf
+    bears, hold = one.bears or other.bears, one.label and other.label
+    across = 0.0 if bears else ACROSS
     together = not one.partners.isdisjoint(other.partners)
-    return across, across if together else clearance - 2 * (ALONG + ROUNDING)
+    return apart, across if together and (bears or not hold) else apart, across
 
 
-def _pairs(one: Presence, other: Presence, clearance: float) -> list[Lacking]:
+def _meeting(layer: Index, beside: Index) -> Index:
+    """Which of the distances bodies in some layers need to bodies in others."""
+    alike = (layer == beside) | (layer == ANY) | (beside == ANY)
+    return np.where(alike, np.maximum(layer, beside) == PAYLOADS, 2)
+
+
+def _pairs(one: Presence, other: Presence, needed: Distances) -> list[Lacking]:
     """The pairs of boxes of two presences that come too near, and by how much."""
-    across, apart = _needed(one, other, clearance)
-    here = _within(one.boxes, other.hull, apart)
-    there = _within(other.boxes, one.hull, apart) if len(here) else here
+    here = _within(one.boxes, other.hull, max(needed))
+    there = _within(other.boxes, one.hull, max(needed)) if len(here) else here
     if not len(there):
         return []
-    a, b = one.boxes[here][:, None], other.boxes[there][None]
-    layer, beside = one.layers[here][:, None], other.layers[there][None]
-    alike = (layer == beside) | (layer == ANY) | (beside == ANY)
-    lacking = np.where(alike, apart, across) + _overlap(a, b)
+    meeting = _meeting(one.layers[here][:, None], other.layers[there][None])
+    lacking = np.array(needed)[meeting]
+    lacking += _overlap(one.boxes[here][:, None], other.boxes[there][None])
     pairs = zip(*np.nonzero(lacking > ROUNDING), strict=True)
     return [(float(lacking[i, j]), int(here[i]), int(there[j])) for i, j in pairs]
 

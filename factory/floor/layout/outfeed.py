@@ -1,15 +1,25 @@
 """The outfeed: the duration of its cycle (the tray carries a product into the shed, waits until
-that is shut, and comes back), and the slot in the tray for a round bottom."""
+that is shut, and comes back), the slot in the tray for a round bottom, and what stands."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from math import sqrt
 
 import numpy as np
 
 from factory.floor.geometry.solids import Solid
-from factory.floor.layout.dimensions import BEHIND, PLAY, SLOT, Clearance
+from factory.floor.layout.dimensions import (
+    BEHIND,
+    BELT_GAP,
+    FINGER_TOP,
+    PAYLOAD,
+    PLAY,
+    SLOT,
+    TRAY,
+    WALL,
+    Clearance,
+)
 from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.surfaces import Body
@@ -28,6 +38,20 @@ NEAR = 1e-3
 
 FLAT = 1e-5
 """What dips no deeper stands flat [m]."""
+
+BELT = PAYLOAD - BELT_GAP - TRAY
+"""Height of the belt [m]."""
+
+SLIT = 2e-4
+"""Between the shutter when it is down and the belt [m]."""
+
+UPRIGHT, LEG = 0.004, 0.006
+"""Half the widths of the uprights on which the shutter slides, and of the legs [m]."""
+
+Point3 = tuple[float, float, float]
+
+Slab = tuple[str, Point3, Point3]
+"""Something that stands: its name, its middle, and half its size [m]."""
 
 HalfSpace = tuple[int, float, int]
 """All that is beyond a bound [m] on an axis, one way (+1, -1) along it."""
@@ -70,6 +94,39 @@ def _drives(layout: Layout, settings: Settings) -> tuple[GovernedAxis, GovernedA
 def _arrives(way: Trajectory, settings: Settings) -> int:
     """The tick in which the tray or its shutter is where it goes."""
     return way.rests(NEAR, NEAR / settings.tick)
+
+
+def table(layout: Layout) -> Iterator[Slab]:
+    """The belt, the shed's walls, roof and back, with uprights for the shutter, and the legs, about
+    the middle of the outfeed's box: name, middle and half the size [m]."""
+    xlo, xhi, ylo, yhi = layout.outfeed
+    thick = (BELT - FINGER_TOP) * 0.8
+    (x, y), half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
+    mouth, back, low, high = layout.shed
+    mouth += WALL
+    stroke = layout.shutter_stroke
+    top = BELT + SLIT + stroke + WALL
+    length, width = back - mouth - WALL, high - low
+    along, across = mouth + length / 2 - x, (low + high) / 2 - y
+    end = mouth + length + WALL / 2 - x
+    a, slot = layout.guidepaths[0].a, slot_of(layout)
+    if slot is not None:
+        slot = slot[0] + a[0] - x, slot[1] + a[1] - y, slot[2] + a[1] - y
+    belt = -half[0], min(half[0], mouth + length - x - SLIT), -half[1], half[1]
+    for number, (at, rest) in enumerate(slotted(belt, slot), 1):
+        name = "belt" + (f"/{number}" if number > 1 else "")
+        yield name, (*at, BELT - thick / 2), (*rest, thick / 2)
+    yield "roof", (along, across, top - WALL / 2), (length / 2, width / 2 - WALL, WALL / 2)
+    yield "back", (end, across, top / 2), (WALL / 2, width / 2, top / 2)
+    for side in (-1, 1):
+        beside = across + side * (width - WALL) / 2
+        yield f"wall{side}", (along, beside, top / 2), (length / 2, WALL / 2, top / 2)
+        upright = mouth + UPRIGHT - x, beside, top + stroke / 2
+        yield f"upright{side}", upright, (UPRIGHT, WALL / 2, stroke / 2)
+    leg, front = min(LEG, *half), layout.outgoing[1]
+    for side in (-1, 1):
+        foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
+        yield f"leg{side}", foot, (leg, leg, (BELT - thick) / 2)
 
 
 def slot_of(layout: Layout) -> tuple[float, float, float] | None:

@@ -1,7 +1,7 @@
 """Piles that a robot can carry back to the B end of its guidepath as scrap.
 
-A pile is swept from where it is complete back to B, and compared with all regions of the clearance
-certificate, wherever the other robots are. A pile that may come too near to one of them is dropped
+A pile is swept from where it is complete back to B, and compared with all regions of the layout,
+wherever the other robots are. A pile that may come too near to one of them is dropped
 where it is.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from factory.floor.layout.certificate import HAND_BODY, PAYLOAD_BODY, Region
-from factory.floor.layout.clearance import ClearanceSearch
+from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.sweeps import Pile, piles, regions
@@ -23,11 +23,11 @@ def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
     robots = range(len(layout.factory.robots))
     ways = [way for robot in robots for way in _ways_back(layout, robot, by_label)]
     here = [region for region in regions(layout, by_label) if region.layer == PAYLOADS]
-    search, back = ClearanceSearch(layout, [*here, *ways]), {id(way) for way in ways}
+    crowding, back = Crowding(layout), {id(way) for way in ways}
     barred = set[tuple[int, str]]()
-    for one, other in search.near(search.swept):
+    for one, other in crowding.near([*here, *ways]):
         mine = [region for region in (one, other) if id(region) in back]
-        if len(mine) == 1 and not search.settled(one, other):
+        if len(mine) == 1 and not crowding.may_meet(one, other):
             barred.add((mine[0].robot, mine[0].label))
     return frozenset(barred)
 

@@ -9,9 +9,8 @@ segment the places on both sides of the passes are marked beside the wait or the
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations
 
 import numpy as np
 
@@ -22,10 +21,15 @@ from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOAD, PAYLOADS
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.limbs import Limb, limbs, rises_first
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.presence import ROUNDING, MachineBodies, Presence, Span, corners_of
+from factory.floor.layout.presence import (
+    ROUNDING,
+    MachineBodies,
+    Presence,
+    Span,
+    corners_of,
+)
 from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import end_of, is_end, start_of
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
@@ -124,35 +128,6 @@ class Staying:
             *_way(layout, robot),
         )
 
-    def ends(self) -> Iterator[tuple[Presence, Presence]]:
-        """Pairs of robots at the end of an operation of both, the first without its payload, the
-        second with it. All robots stand at their goals; of a robot that waits for its carrier the
-        last stretch counts, and of a lift that is lowered its stroke. Whether payloads collide is
-        judged in `floor/mating/`."""
-        for operation in self.layout.factory.making:
-            carrier = operation.robots.index(operation.carrier)
-            for pair in permutations(range(len(operation.robots)), 2):
-                one, other = (self._end(operation, slot, carrier in pair) for slot in pair)
-                yield replace(one, bodies=self._own[one.robot]), other
-
-    def _end(self, operation: Operation, slot: int, comes: bool) -> Presence:
-        """A robot with its payload at the end of an operation, and on the stretch before that where
-        it `comes` to its carrier and has waited for it."""
-        layout, robot, label = self.layout, operation.robots[slot], operation.before[slot]
-        visit, bodies = layout.visits[operation.index, robot], self._own[robot]
-        end, low = visit.at, visit.lift
-        high, far = low, end
-        if layout.factory.lowers(robot) and layout.factory.delivers(robot, operation.index):
-            high = visit.up
-        pile = operation.pile
-        if comes and (slot != operation.lowered or pile != NOPART):
-            far += layout.standoff(operation, slot)
-        if label != NOPART:
-            bodies += self.held(robot, operation.index, label)
-        sweeps = ((far, end), (high, high)), ((end, end), (high, low))
-        name = layout.factory.robots[robot].name
-        return Presence(robot, name, (operation.place,), bodies, sweeps, self.partners[robot])
-
     @cached_property
     def _pieces(self) -> Mapping[str, Array]:
         """The boxes (n, 2, 3) of the convex bodies of each part, in the product."""
@@ -223,12 +198,11 @@ class Staying:
     def goal(self, robot: int, step: int) -> float:
         """Where a robot goes in the wait before a step of its gear, an arc length [m]."""
         layout, (_, number, _) = self.layout, self._steps(robot, step)
-        operation, hand = layout.factory.operations[number], layout.hand(robot)
+        operation = layout.factory.operations[number]
         since, visit = layout.ways[number, robot]
         if robot not in self._awaited or operation.before[operation.robots.index(robot)] != NOPART:
             return since.at
-        tall = hand is not None and hand.tall
-        return self._awaited[robot] if tall or not operation.inputs else visit.at
+        return self._awaited[robot] if goes_home(layout, robot, number) else visit.at
 
     def _chains(self, after: int, robot: int) -> tuple[Chain, Chain]:
         """The passes of a robot's carriage that follow a transition, and of its lift."""
@@ -256,6 +230,13 @@ class Staying:
             return at
         length = self.layout.guidepaths[axis].length
         return length if abs(length - at) <= HOME + ROUNDING else at
+
+
+def goes_home(layout: Layout, robot: int, operation: int) -> bool:
+    """Whether a robot that goes ahead before an operation goes home, not to where its visit is: it
+    takes a part there, or its hand is tall."""
+    hand = layout.hand(robot)
+    return not layout.factory.operations[operation].inputs or (hand is not None and hand.tall)
 
 
 def comes_last(layout: Layout, robot: int, operation: int) -> bool:
@@ -318,11 +299,19 @@ def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
     return np.array([*path.heading, 0.0]) * ahead, path if path.bends else None
 
 
+def station(operation: int) -> int:
+    """The number that a robot shares with the machine that gives it a part, or takes its product,
+    in an operation (index) which is its alone."""
+    return ~operation
+
+
 def _partners(layout: Layout) -> list[frozenset[int]]:
     """For each robot the carriers that it works with, itself among them; for those on one stem
-    themselves, since they are no partners of each other."""
+    themselves, since they are no partners of each other; and the stations that it has alone."""
     partners = [{robot} for robot in range(len(layout.guidepaths))]
     for operation in layout.factory.operations:
+        if len(operation.robots) == 1:
+            partners[operation.carrier].add(station(operation.index))
         on_stem = (robot for robot in operation.robots if robot in layout.stems)
         met = next(on_stem, operation.carrier)
         for robot in operation.robots:

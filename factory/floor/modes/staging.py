@@ -1,10 +1,10 @@
 """Staging: a robot that waits empty-handed for others goes ahead to where they need it.
 
 The paper's `wait` stands still. Here its field may be that of the operation to come, as far as it
-moves this robot; its goal is still everything, so the net is the same, and is proved as before. It
-needs no certificate of its own: a carriage, its mast and arm, below all payloads, may be anywhere
-on their guidepath in any mode (`layout/clearance.py`). Nothing else may: a payload is kept away
-from those it is to meet until their mode begins.
+moves this robot; its goal is still everything, so the net is the same, and is proved as before. The
+certificate holds for who goes ahead too: who would come near another machine there stays where it
+is (`exclusions.too_near`). So a payload is kept away from those it is to meet until their mode
+begins.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from factory.floor.layout.exclusions import awaited_positions
+from factory.floor.layout.exclusions import awaited_positions, too_near
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
+from factory.floor.layout.staying import goes_home
 from factory.floor.modes.modes import operation_starts
 from factory.support.arrays import Array
 from factory.support.settings import Settings
@@ -76,9 +77,9 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                     layout, operation, mode, slot, float(start[slot]), awaited.get(robot)
                 )
                 continue
-            goal, hand = float(mode.goals[slot]), layout.hand(robot)
+            goal = float(mode.goals[slot])
             ahead = clear and operation.awaits_empty(slot) and mode.gate[slot] < 0
-            if not operation.inputs or (hand is not None and hand.tall):
+            if goes_home(layout, robot, operation.index):
                 # others may be where a tall hand comes home to, and a part before a hand above it
                 empty = operation.awaits_empty(slot) or not operation.inputs
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
@@ -133,11 +134,11 @@ def _ahead(
 
 def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[HeadStart, ...]:
     """Those, where the settings ask for them; else those that something may wait for."""
-    every = stages(layout, modes)
+    every, may = stages(layout, modes), {*awaited_positions(layout)}
     if settings.stage:
-        return every
-    awaited = awaited_positions(layout)
-    return tuple(stage for stage in every if stage.axis in awaited or stage.axis != stage.robot)
+        ahead = {stage.robot for stage in every} - may
+        may |= ahead - too_near(layout, ahead)
+    return tuple(stage for stage in every if stage.axis in may or stage.axis != stage.robot)
 
 
 def with_time(

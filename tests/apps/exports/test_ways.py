@@ -118,6 +118,21 @@ def test_a_magazine_that_is_10_mm_lower_is_refused() -> None:
         m.geom_pos[number, 2] += 0.01
 
 
+@pytest.mark.parametrize("name", ["r9", "r1"])
+def test_a_post_in_the_way_is_refused(name: str) -> None:
+    m, machines, clearance = written(39014)
+    number, feeder, turned = m.geom("feeder/p3/post").id, m.body("feeder/p3"), np.zeros(3)
+    before = m.geom_pos[number].copy()
+    mujoco.mju_rotVecQuat(
+        turned, m.body(f"{name}/carriage").pos - feeder.pos, feeder.quat * [1, -1, -1, -1]
+    )
+    m.geom_pos[number, :2] = turned[:2]
+    try:
+        refused(check(m, machines, clearance), f"{name}/", "near feeder/p3/post, which stands")
+    finally:
+        m.geom_pos[number] = before
+
+
 def test_a_clear_point_that_is_5_mm_short_is_refused() -> None:
     m, machines, clearance = written(39014)
     beyond = [
@@ -137,7 +152,7 @@ def test_what_a_unit_made_alone_needs_at_once_is_refused() -> None:
     paths[2] = replace(paths[2], a=(x, y + 0.1))
     moved = replace(laid_out(0), guidepaths=tuple(paths), certificate=None)
     faults = [fault.message for fault in exclusions(moved).faults]
-    refused(faults, "carriage of r1, in r1:nopart,", "of r3, in sub2,", "needs both at once")
+    refused(faults, "carriage of r2, in sub3", "of r3, in sub3,", "needs both at once")
 
 
 # --- presences ------------------------------------------------------------------------------------
@@ -151,7 +166,7 @@ def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -
     judged = [judge.nearer(pair) for pair in pairs]
     assert any(judged) and not all(judged)
     monkeypatch.setattr(nearness, "rough", nearness.exact)
-    assert judged == [nearness.nearer(pair, clearance) for pair in pairs]
+    assert judged == [nearness.Nearness(clearance).nearer(pair) for pair in pairs]
     monkeypatch.setattr(nearness, "exact", None)
     again = [*presences(layout, net, back)]
     for pair in nearness.near(again, clearance):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,7 +19,8 @@ from factory.apps.platen.compacting import compacted
 from factory.apps.platen.placing import Floor, Placing
 from factory.apps.platen.platen import on_platen
 from factory.floor.layout.bending import Detour
-from factory.floor.layout.clearance import searched
+from factory.floor.layout.certificate import Region
+from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.durations import Pace, cycle_of
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
@@ -72,11 +74,14 @@ def test_each_layout_found_takes_less_floor_and_is_about_as_fast(
         assert cycle_of(layout, PACE) <= compacting.SLOWER * cycle_of(straight, PACE)
 
 
-def test_the_search_and_the_certificate_agree_about_regions(found: list[Layout]) -> None:
+def crowded(layout: Layout) -> Iterator[tuple[Region, Region]]:
+    return Crowding(layout).crowded(regions(layout, piles(layout.factory, layout.product)))
+
+
+def test_no_layout_found_is_crowded(found: list[Layout]) -> None:
     """No layout found has regions that are too near; what else is wrong is not seen by regions."""
     for layout in found:
-        search, _ = searched(layout)
-        assert not [*search.faults()]
+        assert not [*crowded(layout)]
 
 
 def test_branches_that_come_too_near_are_seen(straight: Layout) -> None:
@@ -95,8 +100,7 @@ def certified_or_none(straight: Layout, placing: Placing) -> Layout | None:
     from factory.floor.layout.bending import bent
 
     layout = bent(straight, placing.bends)
-    search, _ = searched(layout)
-    return None if [*search.faults()] else layout
+    return None if [*crowded(layout)] else layout
 
 
 def test_a_search_is_the_same_each_time(straight: Layout, monkeypatch: pytest.MonkeyPatch) -> None:

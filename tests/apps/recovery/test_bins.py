@@ -14,8 +14,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.floor.layout import bins
 from factory.floor.layout.bins import Bin, bins_of
 from factory.floor.layout.certificate import BIN_BODY, Region
-from factory.floor.layout.clearance import ClearanceSearch
-from factory.floor.layout.dimensions import LAYERS
+from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.sweeps import piles, regions
 from tests.apps.recovery.test_recovery import assert_recovered, run_with
@@ -34,18 +33,14 @@ def bin_regions(layout: Layout, made: tuple[Bin, ...]) -> list[Region]:
 
 
 def unsettled(layout: Layout, made: tuple[Bin, ...]) -> list[tuple[Region, Region]]:
-    """Pairs of regions that are too near by the check that certifies a layout, one of a bin or of
-    what flies into it."""
+    """Pairs of regions that are too near, one of a bin or of what flies into it."""
     others = regions(layout, piles(layout.factory, layout.product))
     added = bin_regions(layout, made)
-    mine, search = {id(region) for region in added}, ClearanceSearch(layout, [*others, *added])
+    mine, swept = {id(region) for region in added}, [*others, *added]
     return [
         (one, other)
-        for layer in LAYERS
-        for one, other in search.near([r for r in search.swept if r.layer == layer])
-        if not mine.isdisjoint((id(one), id(other)))
-        and not {id(one), id(other)} <= flights(added)
-        and not search.settled(one, other)
+        for one, other in Crowding(layout).crowded(swept)
+        if not mine.isdisjoint((id(one), id(other))) and not {id(one), id(other)} <= flights(added)
     ]
 
 

@@ -165,20 +165,18 @@ def test_piles_and_the_product_are_handed_over() -> None:
     assert nodes_of(made) == nodes
 
 
-@pytest.mark.parametrize("change", ["step", "lane"])
-def test_a_cut_in_the_wrong_place_is_caught(change: str) -> None:
-    """Too near for what stands there, or in one lane with the robot that takes over."""
+def test_a_cut_in_the_wrong_place_is_caught() -> None:
+    """In one lane with the robot that takes over; or too near for what stands there, which then
+    has to wait."""
     layout, found = cuttable(bare(32))
     label = max(found, key=lambda x: found[x].end - found[x].start)
     good = cut(layout, found, {label: 1})
-    assert certify(good).holds
-    if change == "step":
-        found[label] = replace(found[label], end=found[label].start + 0.1, step=0.05, last=0.0)
-        wrong = cut(layout, found, {label: 1})
-    else:
-        paths = [replace(path, offset=path.offset + path.aside) for path in good.guidepaths]
-        wrong = replace(good, guidepaths=tuple(paths))
-    assert not certify(wrong).holds
+    assert certify(good).holds and not certify(good).apart.orders
+    found[label] = replace(found[label], end=found[label].start + 0.1, step=0.05, last=0.0)
+    near = certify(cut(layout, found, {label: 1}))
+    assert near.holds and [order.before for order in near.apart.orders] == ["n_e"]
+    paths = [replace(path, offset=path.offset + path.aside) for path in good.guidepaths]
+    assert not certify(replace(good, guidepaths=tuple(paths))).holds
 
 
 def test_the_pace_does_not_depend_on_the_size() -> None:

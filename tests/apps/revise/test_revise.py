@@ -150,22 +150,23 @@ def test_robots_of_the_truck_stay_for_the_van(truck_to_van: Revision) -> None:
 
 def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van: Revision) -> None:
     found, mine = truck_to_van, truck_to_van.inheritance
-    old, new = found.old.layout.certificate, found.new.layout.certificate
-    assert old is not None and new is not None
+    old, new = found.old.layout, found.new.layout
+    assert old.certificate is not None and new.certificate is not None
     assert mine.inherited > mine.pairs / 2
     assert [*refuted(mine, old, new, found.pairing)] == []
-    here, there = next(iter(mine.regions.items()))
-    other = next(n for n in range(len(new.regions)) if n not in mine.regions)
+    here, there = next(iter(mine.entries.items()))
+    other = next(n for n in range(mine.pairs) if n not in mine.entries)
+    elsewhere = next(n for n in mine.entries.values() if n > there + 20)
     for forged, words in (
-        (replace(mine, regions={**mine.regions, other: there}), "entry"),
-        (replace(mine, regions={**mine.regions, here: there + 1}), "entry"),
-        (replace(mine, regions={**mine.regions, here: 10**6}), "no such region"),
-        (replace(mine, inherited=mine.inherited + 1), "miscounted"),
-        (replace(mine, shift=(mine.shift[0], 0.01)), "elsewhere"),
+        (replace(mine, entries={**mine.entries, other: there}), "of other machines"),
+        (replace(mine, entries={**mine.entries, here: elsewhere}), "of other machines"),
+        (replace(mine, entries={**mine.entries, here: 10**6}), "no such entry"),
+        (replace(mine, pairs=mine.pairs + 1), "miscounted"),
     ):
         assert any(words in fault for fault in refuted(forged, old, new, found.pairing)), words
-    false = replace(old, faults=(Fault("it is not clear", ("r1", "r2")),))
-    assert "does not hold" in next(refuted(mine, false, new, found.pairing))
+    false = replace(old.certificate, faults=(Fault("it is not clear", ("r1", "r2")),))
+    faulty = replace(old, certificate=false)
+    assert "does not hold" in next(refuted(mine, faulty, new, found.pairing))
 
 
 def test_the_same_product_keeps_everything() -> None:
@@ -200,9 +201,7 @@ def test_an_added_part_moves_few(name: str, joined: str, place: int, module: int
     found = revised(old, project(new))
     assert sum(kept.place for kept in found.kept) >= place
     assert sum(kept.module for kept in found.kept) >= module
-    before, after = found.old.layout.certificate, found.new.layout.certificate
-    assert before is not None and after is not None
-    assert [*refuted(found.inheritance, before, after, found.pairing)] == []
+    assert [*refuted(found.inheritance, found.old.layout, found.new.layout, found.pairing)] == []
 
 
 def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:

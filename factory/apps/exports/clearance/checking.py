@@ -2,14 +2,15 @@
 
 A certificate holds if its places are those of the net; if each body with a joint has ways, within
 the ranges of its joints and up to their ends; if each machine is in one of its ways in every
-marking and comes to the next without a jump, with the parts that it holds; and if any two ways of
-different machines, in different places, that come near are excluded by a circuit of the net that
-goes through a place of both and carries one token.
+marking and comes to the next without a jump, with the parts that it holds; if none comes near what
+stands; and if any two ways of different machines, in different places, that come near are excluded
+by a circuit of the net that goes through a place of both and carries one token.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 
 from factory.apps.exports.clearance.documents import ClearanceProof, ExcludedPair, MachineWay
@@ -22,7 +23,7 @@ from factory.apps.exports.clearance.moving import (
     jumps,
     starts_outside,
 )
-from factory.apps.exports.clearance.sweeping import Sweeping
+from factory.apps.exports.clearance.sweeping import TOUCHING, Sweeping
 
 PLAY = 0.125
 """The stops of a joint begin to act no further beyond its ways than this share of the distance over
@@ -168,7 +169,7 @@ def _starts(machines: Machines, way: MachineWay) -> bool:
 
 
 def _pairs(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
-    """Machines that come near are excluded by a circuit."""
+    """Machines that come near are excluded by a circuit; what stands they never come near."""
     apart = set[tuple[str, ...]]()
     for pair in proof.excluded:
         if reason := _circuit(proof, pair):
@@ -184,6 +185,13 @@ def _pairs(proof: ClearanceProof, machines: Machines) -> Iterator[str]:
 
     sweeping = Sweeping(machines)
     swept = [(way, sweeping.swept(way)) for way in proof.ways]
+    standing = sweeping.standing({body for way in proof.ways for body in way.bodies})
+    for way, mine in swept:
+        moving = tuple(b for b in way.bodies if machines.root(machines.bodies[b]))
+        if moving != way.bodies:
+            mine = sweeping.swept(replace(way, bodies=moving))
+        if geoms := mine.near(standing, TOUCHING):
+            yield f"{way}: {geoms[0]} comes near {geoms[1]}, which stands"
     for (one, mine), (other, its) in combinations(swept, 2):
         if one.machine == other.machine or {*one.places} & {*other.places}:
             continue
@@ -201,7 +209,9 @@ def _circuit(proof: ClearanceProof, pair: ExcludedPair) -> str:
     net, listed = proof.net, ", ".join(pair.circuit)
     if not all(name in net for name in (*pair.circuit, *pair.places)):
         return f"its circuit is not of the net: {listed}"
-    if len(pair.places) != 2 or not {*pair.places} <= {*pair.circuit}:
+    if len(pair.places) != 2 or pair.places[0] == pair.places[1]:
+        return f"it has not two places, but {' and '.join(pair.places)}"
+    if not {*pair.places} <= {*pair.circuit}:
         return f"its circuit is not through {' and '.join(pair.places)}"
     onward = (*pair.circuit[1:], *pair.circuit[:1])
     for here, then in zip(pair.circuit, onward, strict=True):

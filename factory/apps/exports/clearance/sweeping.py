@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,11 @@ NEAREST = 2e-5
 PIECES = 3
 """The group of the geoms that are the convex pieces of a part."""
 
+TOUCHING = 1e-5
+"""A machine touches what stands within this: a shutter slides closely before its walls [m]."""
+
+PLANE = int(mujoco.mjtGeom.mjGEOM_PLANE)
+
 STEPS = 90
 """Angles at which a turning box is looked at."""
 
@@ -30,11 +36,12 @@ class SweptBoxes:
     geoms: tuple[str, ...]
     boxes: Boxes
 
-    def near(self, other: SweptBoxes) -> tuple[str, str] | None:
-        """The geoms of two machines that come nearest, where they are near."""
+    def near(self, other: SweptBoxes, least: float = NEAREST) -> tuple[str, str] | None:
+        """The geoms of two machines that come nearest, where that is no more than the `least`
+        distance [m]."""
         a, b = self.boxes, other.boxes
         apart = np.maximum(a[:, None, 0] - b[None, :, 1], b[None, :, 0] - a[:, None, 1]).max(axis=2)
-        if not apart.size or apart.min() > NEAREST:
+        if not apart.size or apart.min() > least:
             return None
         i, j = np.unravel_index(int(apart.argmin()), apart.shape)
         return self.geoms[i], other.geoms[j]
@@ -67,6 +74,18 @@ class Sweeping:
                 box = self._box(geom, at, here @ turn @ _turn(m.geom_quat[geom]))
                 boxes += self._sweep(holder, way, box)
                 names += [m.geom(geom).name or m.body(part).name] * len(way.spans)
+        return SweptBoxes(tuple(names), np.array(boxes).reshape(-1, 2, 3))
+
+    def standing(self, moving: Collection[str]) -> SweptBoxes:
+        """What stands on the ground, apart from some bodies: those of machines."""
+        m, d = self._m, self._d
+        machines = {self._machines.bodies[name] for name in moving}
+        bodies = (b for b in range(m.nbody) if not self._machines.root(b) and b not in machines)
+        geoms = [
+            g for body in bodies for g in self._machines.solid(body) if m.geom_type[g] != PLANE
+        ]
+        boxes = [self._box(g, d.geom_xpos[g], d.geom_xmat[g].reshape(3, 3)) for g in geoms]
+        names = (m.geom(g).name or m.body(m.geom_bodyid[g]).name for g in geoms)
         return SweptBoxes(tuple(names), np.array(boxes).reshape(-1, 2, 3))
 
     def _sweep(self, body: int, way: MachineWay, box: Boxes, standing: bool = False) -> list[Boxes]:
