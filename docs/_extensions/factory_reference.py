@@ -26,7 +26,7 @@ from factory.support.explanations import codes, explain
 from factory.support.resources import mjcf_folder
 from factory.support.settings import RANGES, Settings
 from factory.support.user_defaults import OPTIONS
-from factory.theory.lang.values import GEOMETRY
+from factory.theory.lang.values import WRITTEN
 from factory.theory.problem.robot_types import load_catalogue
 
 if TYPE_CHECKING:
@@ -114,14 +114,14 @@ def variable(name: str) -> str:
 
 def language() -> str:
     """The languages of PAGs and templates: their grammars, and what parts may say."""
-    rows = [(f"`{name}`", f"{kind.wanted}", f"`{kind.example}`") for name, kind in GEOMETRY.items()]
+    rows = [(f"`{name}`", f"{kind.wanted}", f"`{kind.example}`") for name, kind in WRITTEN.items()]
     return "\n\n".join(
         [
             heading(1, "The PAG language"),
             "What a text means is told in [the theory of PAGs](../theory/pag.md). Lengths are "
-            "metres, or of the unit that the text says; turns are quaternions (w, x, y, z); a "
-            "colour may be a name of CSS; `box` has its three sides, `cylinder` radius "
-            "and height, `sphere` its radius.",
+            "metres, or of the unit that the text says; `quat` is (w, x, y, z), `turn` in degrees "
+            "about x, then y, then z of the product; a colour may be a name of CSS; `box` has its "
+            "three sides, `cylinder` radius and height, `sphere` its radius.",
             heading(2, "Geometry of a part"),
             "The parameters of `atomic`, and of every operation with `parameters = geometry`.",
             table(("parameter", "value", "for example"), rows),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -15,7 +16,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.theory.lang import load_pag, load_templates, read_pag, write_pag
 from factory.theory.lang import pag_syntax as syntax
 from factory.theory.lang.recovery import Stuck, drive
-from factory.theory.problem.pag import PAG, Parameter
+from factory.theory.problem.pag import PAG, Assembly, Parameter
 from tests.pag_texts import read_or_refused
 from tests.paths import TESTS
 from tests.strategies import mutations, pags, random_pag_text
@@ -140,6 +141,9 @@ def test_vectors_on_one_line_and_on_several() -> None:
 
 def test_numbers_stay_as_they_are_written() -> None:
     assert part("quat = ( 2, 0, 0, 0 )") == (Parameter("quat", (2.0, 0.0, 0.0, 0.0)),)
+    half = 0.707106781
+    assert part("turn = ( 0, 0, -90 )") == (Parameter("quat", (half, 0.0, 0.0, -half)),)
+    assert part("turn = ( 90, 0, 90 )") == (Parameter("quat", (0.5, 0.5, 0.5, 0.5)),)
 
 
 def test_meshes_lie_beside_the_file() -> None:
@@ -425,3 +429,51 @@ def test_many_errors_take_linear_work(damage: str) -> None:
 
 def test_templates_of_the_session(templates: Mapping[str, object]) -> None:
     assert dict(templates) == dict(TEMPLATES)
+
+
+@given(st.tuples(*[st.integers(-1800, 1800)] * 3))
+def test_a_turn_in_tenths_of_degrees_is_written_as_it_was_read(tenths: tuple[int, ...]) -> None:
+    """It is the rotation about x, then y, then z, and the same quaternion is read again."""
+    turn = ", ".join(f"{n / 10:g}" for n in tenths)
+    pag = read(f"root = p; p = atomic ( turn = ( {turn} ) )")
+    (quat,) = (parameter.value for parameter in pag["p"].parameters)
+    assert isinstance(quat, tuple)
+    w, x, y, z = quat
+    a, b, c = (math.radians(n / 10) for n in tenths)
+    assert 2 * (w * y - x * z) == pytest.approx(
+        math.sin(b), abs=1e-8
+    )  # minus the z of where x goes
+    assert 2 * (y * z + w * x) == pytest.approx(math.cos(b) * math.sin(a), abs=1e-8)
+    assert 2 * (x * y + w * z) == pytest.approx(math.cos(b) * math.sin(c), abs=1e-8)
+    text = write_pag(pag)
+    assert ("turn = " in text) == (quat != (1, 0, 0, 0))
+    assert read(text) == pag
+
+
+def test_a_part_has_one_rotation() -> None:
+    (error,) = errors("root = p; p = atomic ( turn = ( 0, 0, 90 ), quat = ( 1, 0, 0, 0 ) )")
+    assert error.code == "BadValue" and "one rotation" in error.message
+    assert "keep one of turn, quat" in error.hint
+    (error,) = errors("root = p; p = atomic ( rotation = ( 0, 0, 90 ) )")
+    assert "did you mean 'turn'?" in error.hint
+
+
+def test_copies_are_written_as_they_are_read() -> None:
+    """Only what is numbered from one and differs in its place alone; the name is no other label."""
+    text = (
+        "root = all; all = mate ( plate, screw, odd1, odd3, x1, x2, y1, y2 );\n"
+        "plate = atomic();\n"
+        "screw[3] = atomic ( cylinder = ( 1, 9 ) ) at ( 0, 0, 0 ), ( 5, 0, 0 ), ( 9, 0, 0 );\n"
+        "odd1 = atomic ( pos = ( 1, 0, 0 ) ); odd3 = atomic ( pos = ( 2, 0, 0 ) );\n"
+        "x1 = atomic ( mass = 1, pos = ( 1, 0, 0 ) );\n"
+        "x2 = atomic ( mass = 2, pos = ( 2, 0, 0 ) );\n"
+        "y1 = atomic ( pos = ( 1, 0, 0 ) ); y2 = atomic ( pos = ( 2, 0, 0 ), mass = 1 );\n"
+    )
+    pag = read(text)
+    written = write_pag(pag)
+    assert read(written) == pag and len(pag) == 11
+    assert [line.partition(" = ")[0] for line in written.splitlines()[2:]] == [
+        "plate", "screw[3]", "odd1", "odd3", "x1", "x2", "y1", "y2"
+    ]  # fmt: skip
+    both = PAG("all", (*pag.nodes[1:5], Assembly("screw", "mate", ("screw1", "screw2"))))
+    assert "screw[" not in write_pag(both)

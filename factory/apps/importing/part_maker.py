@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from warnings import catch_warnings
 
 import numpy as np
 
@@ -19,6 +20,10 @@ from factory.theory.lang.operations import MESHES
 from factory.theory.lang.source import near_file, quoted
 from factory.theory.lang.values import GEOMETRY
 from factory.theory.problem.pag import SHAPES, Parameter, Value
+
+CLEAN, NOISE = 0.1, 1e-6
+"""A clean rotation is by multiples of so many degrees about the axes; one that differs from it by
+no more than such an angle [rad] is that rotation."""
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of no rotation."""
@@ -58,10 +63,17 @@ def rounded(numbers: Array) -> tuple[float, ...]:
 
 
 def quaternion(turn: Array) -> tuple[float, ...]:
-    """The unit quaternion (w, x, y, z), w >= 0, of the rotation nearest to a matrix."""
+    """The unit quaternion (w, x, y, z), w >= 0, of the rotation nearest to a matrix; that of a
+    clean rotation if it is within NOISE."""
     from scipy.spatial.transform import Rotation
 
-    return rounded(Rotation.from_matrix(turn).as_quat(canonical=True, scalar_first=True))
+    exact = Rotation.from_matrix(turn)
+    with catch_warnings(action="ignore"):  # of angles that are not the only ones
+        angles = exact.as_euler("xyz", degrees=True)
+    clean = Rotation.from_euler("xyz", np.round(angles / CLEAN) * CLEAN, degrees=True)
+    near = (clean * exact.inv()).magnitude() <= NOISE
+    nearest = clean if near else exact
+    return rounded(nearest.as_quat(canonical=True, scalar_first=True))
 
 
 LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)

@@ -16,7 +16,8 @@ from factory.support.errors import Position, did_you_mean
 from factory.support.settings import DWELL
 from factory.theory.lang.source import Findings, near_file, quoted, where
 from factory.theory.lang.statements import Definition, Keyword
-from factory.theory.lang.values import GEOMETRY, Kind, ValueReader, kind_of
+from factory.theory.lang.turns import quaternion_of
+from factory.theory.lang.values import GEOMETRY, WRITTEN, Kind, ValueReader, kind_of
 from factory.theory.lang.words import LABEL_HINT, UNITS, is_label, is_number
 from factory.theory.problem.pag import RESERVED, SHAPES, Assembly, Parameter
 from factory.theory.problem.template import Template
@@ -31,7 +32,8 @@ MEANT = _words(
     {
         "pos": "position at place location xyz translate origin",
         "rgba": "color colour rgb col",
-        "quat": "rotation rotate rot orientation turn angle euler rpy quaternion",
+        "turn": "rotation rotate rot orientation angle angles euler rpy degrees",
+        "quat": "quaternion",
         "box": "size dimensions dims cube cuboid block",
         "cylinder": "cyl radius height rod tube",
         "sphere": "ball",
@@ -55,6 +57,12 @@ MEANT_OPERATIONS = _words(
 
 MESHES = (".obj", ".stl", ".ply", ".glb")
 
+PLANNED = (".step", ".stp", ".3mf", ".off", ".iges", ".igs")
+"""Endings of CAD files that are no meshes of a PAG."""
+
+ROTATIONS = ("turn", "quat")
+"""Parameters that give a part a rotation."""
+
 
 @dataclass(frozen=True, slots=True)
 class Signature:
@@ -77,7 +85,7 @@ class Signature:
 
 def signature(template: Template) -> Signature:
     """The signature of a template."""
-    kinds = dict(GEOMETRY) if template.geometry else {}
+    kinds = dict(WRITTEN) if template.geometry else {}
     for name, default in template.parameters:
         kinds[name] = kind_of(default, DWELL if name == template.law.dwell else math.inf)
     return Signature(template.name, len(template.inputs), bool(template.further), kinds)
@@ -224,14 +232,18 @@ class AssemblyReader:
                 self.findings.add("BadValue", message, name, "remove one of the two")
             elif (value := self.values.read(name, kind, raw)) is not None:
                 position = self.values.place(raw)
-                made.append(Parameter(str(name), value, position))
+                if kind is WRITTEN["turn"] and isinstance(value, tuple):
+                    made.append(Parameter("quat", quaternion_of(value), position))
+                else:
+                    made.append(Parameter(str(name), value, position))
                 if kind is GEOMETRY["mesh"]:
                     self._check_mesh(str(value), position)
                     if self.unit != "m" and all(other.name != "scale" for other in keywords):
                         made.append(Parameter("scale", UNITS[self.unit], position))
             seen.setdefault(name, name)
         if len(seen) > 1 and entry.parameters.get("mesh") is GEOMETRY["mesh"]:
-            self._check_shapes([token for name, token in seen.items() if name in SHAPES])
+            self._check_one("shape", SHAPES, seen)
+            self._check_one("rotation", ROTATIONS, seen)
         return tuple(made)
 
     def _unknown_parameter(self, entry: Signature, name: Token) -> None:
@@ -246,10 +258,14 @@ class AssemblyReader:
             hint = "remove it: that operation has no parameters"
         self.findings.add("UnknownParameter", message, name, hint)
 
-    def _check_shapes(self, shapes: list[Token]) -> None:
-        for shape in shapes[1:]:
-            message = f"a part has one shape, but {quoted(shapes[0])} and {quoted(shape)} are given"
-            self.findings.add("BadValue", message, shape, f"keep one of {', '.join(SHAPES)}")
+    def _check_one(self, what: str, names: Sequence[str], seen: Mapping[str, Token]) -> None:
+        """Note each but the first of parameters of which a part has one."""
+        tokens = [token for name, token in seen.items() if name in names]
+        for other in tokens[1:]:
+            message = (
+                f"a part has one {what}, but {quoted(tokens[0])} and {quoted(other)} are given"
+            )
+            self.findings.add("BadValue", message, other, f"keep one of {', '.join(names)}")
 
     def _check_mesh(self, path: str, position: Position) -> None:
         if path not in self.meshes:
@@ -265,6 +281,9 @@ def _is_bare_number(argument: object) -> TypeGuard[Token]:
 
 def _mesh_problem(folder: str | None, path: str) -> tuple[str, str] | None:
     """The message and hint for a bad mesh path; without a folder only its suffix is checked."""
+    if os.path.splitext(path)[1].lower() in PLANNED:
+        hint = f"`factory plan {path}` makes a PAG of it, with its parts as meshes"
+        return f"{quoted(path)} is a CAD file, not a mesh file", hint
     if os.path.splitext(path)[1].lower() not in MESHES:
         return f"{quoted(path)} is not a mesh file", f"mesh files end in {', '.join(MESHES)}"
     full = os.path.join(folder or "", path)

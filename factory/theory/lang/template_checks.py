@@ -19,7 +19,7 @@ from factory.theory.lang.template_syntax import (
     TemplateDraft,
     Words,
 )
-from factory.theory.lang.values import GEOMETRY, ValueReader
+from factory.theory.lang.values import WRITTEN, ValueReader
 from factory.theory.lang.words import LABEL_HINT, is_label, is_number, number
 from factory.theory.problem.pag import NOPART, RESERVED, Value
 from factory.theory.problem.template import LOST, Failure, Law, Point, Template
@@ -194,8 +194,8 @@ class TemplateMaker:
                 self.findings.add("Syntax", f"{quoted(name)} is no name", name, LABEL_HINT)
             elif name in made:
                 self._bad(f"{quoted(name)} is given twice", name, "remove one of the two")
-            elif clause.geometry and name in GEOMETRY:
-                hint = "choose another name: geometry brings " + ", ".join(GEOMETRY)
+            elif clause.geometry and name in WRITTEN:
+                hint = "choose another name: geometry brings " + ", ".join(WRITTEN)
                 self._bad(f"{quoted(name)} is a parameter of geometry", name, hint)
             elif (value := values.any(name, default)) is not None:
                 made[str(name)] = value

@@ -74,6 +74,9 @@ GEOMETRY: Mapping[str, Kind] = MappingProxyType(
     }
 )
 
+WRITTEN: Mapping[str, Kind] = MappingProxyType({**GEOMETRY, "turn": Kind(3, "( 0, 0, 90 )")})
+"""The same, and those that a text may have in their place: `turn`, which is read as a `quat`."""
+
 
 def kind_of(default: Value, high: float = math.inf) -> Kind:
     """The kind of a template's parameter, from its default: one >= 0 has no negative values."""
@@ -180,7 +183,7 @@ class ValueReader:
 def _better(kind: Kind, words: Sequence[Token]) -> str:
     """A hint for a rotation, or for a colour of three numbers; "" for other values."""
     if kind is GEOMETRY["quat"]:
-        return "(w, x, y, z): a turn by 90 degrees about z is quat = ( 0.7071, 0, 0, 0.7071 )"
+        return "(w, x, y, z); in degrees, 90 about z: turn = ( 0, 0, 90 )"
     levels = [value for word in words if (value := number(word)) is not None and value >= 0]
     if kind is not GEOMETRY["rgba"] or len(levels) != 3 or len(words) != 3 or max(levels) > 255:
         return ""

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly, Mix, Value
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from factory.theory.lang.turns import quaternion_of, turn_of
+from factory.theory.lang.words import is_label
+from factory.theory.problem.pag import (
+    PAG,
+    RESERVED,
+    AllowedOverlap,
+    Assembly,
+    Mix,
+    Parameter,
+    Value,
+)
 from factory.theory.problem.template import LOST, Failure, Law, Template
 
 
 def write_pag(pag: PAG) -> str:
-    """The canonical text of a PAG: one statement a line, numbers at full precision. `read_pag` of
-    it gives the same PAG.
+    """The canonical text of a PAG: one statement a line, numbers at full precision; parts that are
+    copies of each other are one statement. `read_pag` of it gives the same PAG.
 
     Args:
         pag: the PAG.
@@ -16,8 +29,53 @@ def write_pag(pag: PAG) -> str:
     count = [] if pag.count is None else [f"{pag.count} parts;"]
     allowed = map(write_allowance, pag.allowed)
     products = f"root = {pag.root};" if pag.mix is None else write_mix(pag.mix)
-    lines = [*count, products, *allowed, *map(write_assembly, pag.nodes)]
+    lines = [*count, products, *allowed, *map(write_copies, rows_of_copies(pag))]
     return "\n".join(lines) + "\n"
+
+
+def rows_of_copies(pag: PAG) -> Iterator[Sequence[Assembly]]:
+    """The nodes of a PAG, copies together: parts that follow each other, `screw1`, `screw2`, ...,
+    and differ in nothing but their places, which are their last parameters."""
+    row: list[Assembly] = []
+    for node in pag.nodes:
+        following = f"{_shared_name(row[0])}{len(row) + 1}" if row else ""
+        if node.label != following or _but_for_place(node) != _but_for_place(row[0]):
+            yield from _parted(row, pag)
+            row = []
+        row.append(node)
+    yield from _parted(row, pag)
+
+
+def _parted(row: list[Assembly], pag: PAG) -> Iterator[Sequence[Assembly]]:
+    """A row as it is if it can be one statement, else each node for itself."""
+    name = _shared_name(row[0]) if row else ""
+    if len(row) > 1 and is_label(name) and name not in (*RESERVED, *pag.by_label):
+        yield row
+    else:
+        yield from ([node] for node in row)
+
+
+def _shared_name(node: Assembly) -> str:
+    """The name of copies of which a part is the first; "" for any other."""
+    placed = not node.inputs and node.parameters and node.parameters[-1].name == "pos"
+    return node.label[:-1] if placed and node.label.endswith("1") else ""
+
+
+def _but_for_place(node: Assembly) -> tuple[object, ...]:
+    """What copies have in common."""
+    last = node.parameters[-1].name if node.parameters else ""
+    return last, node.operation, node.inputs, node.parameters[:-1]
+
+
+def write_copies(row: Sequence[Assembly]) -> str:
+    """One statement: `screw[2] = atomic ( parameters ) at ( 0, 0, 0 ), ( 0, 0, 0.1 );`."""
+    if len(row) == 1:
+        return write_assembly(row[0])
+    first = replace(
+        row[0], label=f"{_shared_name(row[0])}[{len(row)}]", parameters=row[0].parameters[:-1]
+    )
+    places = ", ".join(write_value(node.parameters[-1].value) for node in row)
+    return f"{write_assembly(first).removesuffix(';')} at {places};"
 
 
 def write_mix(mix: Mix) -> str:
@@ -33,9 +91,19 @@ def write_allowance(allowed: AllowedOverlap) -> str:
 
 def write_assembly(node: Assembly) -> str:
     """One statement: `label = operation ( inputs, parameters );`."""
-    arguments = [*node.inputs, *(f"{p.name} = {write_value(p.value)}" for p in node.parameters)]
+    arguments = [*node.inputs, *map(write_parameter, node.parameters)]
     inside = f" ( {', '.join(arguments)} )" if arguments else "()"
     return f"{node.label} = {node.operation}{inside};"
+
+
+def write_parameter(parameter: Parameter) -> str:
+    """One argument: `dwell = 2`; a rotation that is one in whole tenths of degrees as these."""
+    name, value = parameter.name, parameter.value
+    if name == "quat" and isinstance(value, tuple):
+        turn = turn_of(value)
+        if turn is not None and any(turn) and quaternion_of(turn) == value:
+            name, value = "turn", turn
+    return f"{name} = {write_value(value)}"
 
 
 def write_value(value: Value) -> str:
