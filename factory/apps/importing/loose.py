@@ -90,9 +90,18 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> Imported:
         notes.append(f"one body of {len(pieces)} disconnected pieces: one part each")
     check_count(path, [body.name for body in bodies.bodies], "bodies")
     metres, unit_note = unit_of(bodies, unit)
-    name = file_stem(path.resolve().name if path.is_dir() else path.stem)
+    name = file_stem(_title(path.resolve()))
     pag, meshes = _assembled(name, path, bodies.bodies, metres)
     return Imported(name, pag, meshes, path.name, (*notes, unit_note), has_tree=False)
+
+
+def _title(path: Path) -> str:
+    """The name of a product: that of its file or folder or, where that is the name of a format, as
+    in `lamp/stl`, that of the folder around it."""
+    name = path.name if path.is_dir() else path.stem
+    formats = {suffix.lstrip(".") for suffix in (*MESHES, *SCENES)}
+    around = path.parent.name
+    return around if name.lower().rstrip("s") in {*formats, "mesh", "meshe"} and around else name
 
 
 def _assembled(

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain, count
 from math import ceil
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar, Union
@@ -15,6 +15,7 @@ from factory.api import PAG, Array, Assembly, Template, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
+from factory.apps.planning.titles import Titles
 from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
@@ -91,35 +92,38 @@ def planned_product(
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
     taken |= {node.label for nodes in kept.values() for node in nodes}
-    title = label_of(source.name) or "product"
-    root = _free(chain([title], (f"{title}-{n}" for n in count(1))), taken)
-    names = (f"sub{n}" for n in count(1))
+    titles = Titles(source, taken)
+    root = titles.free(label_of(source.name) or "product")
     made, stack = list[Assembly](), [(root, tree)]
     while stack:
         label, below = stack.pop()
         if isinstance(below, Screwed):
-            for screw in below.screws[::-1]:
-                last = screw == below.screws[0] and isinstance(below.tree, str)
-                pile = below.tree if last else _free(names, taken)
-                made.append(Assembly(label, "screw", (str(pile), screw)))
-                label = str(pile)
+            inside = leaves(below.tree)
+            for number, screw in reversed([*enumerate(below.screws)]):
+                earlier = (*inside, *below.screws[: number - 1])
+                if number:
+                    pile = titles.joined(earlier, below.screws[number - 1 : number])
+                else:
+                    pile = _title(titles, below.tree)
+                made.append(Assembly(label, "screw", (pile, screw)))
+                label = pile
             below = below.tree
         if not isinstance(below, tuple):
             continue
         inputs = []
         for child in below:
-            inputs.append(child if isinstance(child, str) else _free(names, taken))
+            inputs.append(_title(titles, child))
             stack.append((inputs[-1], child))
         made.append(Assembly(label, "mate" if len(inputs) > 1 else "relay", tuple(inputs)))
     whole = [node for nodes in kept.values() for node in nodes if node.inputs]
-    parts = [_turned(part.node, turn) for part in source.parts]
+    parts = _in_rows([_turned(part.node, turn) for part in source.parts])
     nodes = (*made, *reversed(whole), *parts)
-    pag = PAG(root, nodes, len(nodes), allowed=source.allowed)
+    pag = PAG(root, nodes, allowed=source.allowed)
     if allow or threaded:
         meant = _meant(source, pag, allow, templates, threaded)
         pag = replace(pag, allowed=(*source.allowed, *meant))
     name = file_stem(source.name)
-    head = f"// {name}, planned{f' from {by}' if by else ''}\n"
+    head = f"// {name}: {len(parts)} parts, planned{f' from {by}' if by else ''}\n"
     text = (head + write_pag(pag)).encode()
     return PlannedProduct(pag, {f"{name}.pag": text, **source.files})
 
@@ -152,11 +156,44 @@ def _meant(
         yield AllowedOverlap(ceil(1e5 * depth) / 1e5, labels)
 
 
-def _free(names: Iterator[str], taken: set[str]) -> str:
-    """The first of some names that no other node has; it is taken from now on."""
-    label = next(name for name in names if name not in taken)
-    taken.add(label)
-    return label
+def leaves(tree: Tree) -> tuple[str, ...]:
+    """The units of a tree: its base first, then in the order in which they come."""
+    if isinstance(tree, str):
+        return (tree,)
+    if isinstance(tree, Screwed):
+        return (*leaves(tree.tree), *tree.screws)
+    return tuple(label for below in tree for label in leaves(below))
+
+
+def _title(titles: Titles, tree: Tree) -> str:
+    """The label of a sub-tree."""
+    if isinstance(tree, str):
+        return tree
+    if isinstance(tree, Screwed):
+        *before, last = tree.screws
+        return titles.joined((*leaves(tree.tree), *before), (last,))
+    if len(tree) == 1:
+        return titles.passed(leaves(tree))
+    *piled, came = tree
+    return titles.joined(leaves(tuple(piled)), leaves(came))
+
+
+def _in_rows(parts: Sequence[Assembly]) -> list[Assembly]:
+    """The parts, of which those that are copies of each other have their places last, so that a
+    text has them in one statement."""
+    alike = Counter(_but_for_place(part) for part in parts)
+    return [
+        replace(part, parameters=(*rest, place))
+        if place is not None and alike[_but_for_place(part)] > 1
+        else part
+        for part in parts
+        for rest in [tuple(p for p in part.parameters if p.name != "pos")]
+        for place in [next((p for p in part.parameters if p.name == "pos"), None)]
+    ]
+
+
+def _but_for_place(part: Assembly) -> tuple[object, ...]:
+    return tuple(p for p in part.parameters if p.name != "pos")
 
 
 def _turned(node: Assembly, turn: Array) -> Assembly:

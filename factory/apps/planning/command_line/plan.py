@@ -256,10 +256,11 @@ def _print(placed: InPlace, planned: Planned, project: Project, out: OutputOptio
     """Print the plan, before its pictures are drawn: these take longer than most plans do."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
+    operations = len(matings.all) if matings else len(project.pag) - parts
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     ways += _for_hulls(planned.hidden)
-    say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
+    say(f"{project.file}: {parts} parts, {operations} operations; ways: {ways}")
     figures = planned.figures
     for note in planned.notes:
         say(note)
