@@ -9,8 +9,9 @@ completely. The graph of the opposite direction is its transpose.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,13 @@ AXES = range(3)
 """x, y and z of the product."""
 
 
+NO_RELATION = np.zeros((0, 0), bool)
+"""A relation that does not matter."""
+
+Unheld = tuple[frozenset[int], frozenset[int]]
+"""Units that no hand can hold, and those to which they are joined then."""
+
+
 @dataclass(frozen=True)
 class Blocking:
     """The blocking graphs of the units of a plan, by their `labels`.
@@ -61,7 +69,9 @@ class Blocking:
     `depths` (3, n, n): how deep i gets into j [m]; empty if unknown. `hidden`: the parts of two
     units that overlap in the finished product according to the hull of an open mesh, the deepest
     first. `feet`: what units stand on; None if tipping does not matter. `base`: the unit onto which
-    all others come, -1 for none.
+    all others come, -1 for none. `pressed` (n, n): which are drawn into each other when finished,
+    and hold by that. `rests` (n, n): whether i cannot fall past j, which is near it; empty if that
+    does not matter. `worth` (n,): how much a unit is like a base; empty if unknown.
     """
 
     labels: tuple[str, ...]
@@ -74,7 +84,11 @@ class Blocking:
     hidden: tuple[Overlapping, ...] = field(default=(), repr=False)
     feet: Feet | None = field(default=None, repr=False)
     base: int = -1
-    near: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), bool), repr=False)
+    near: NDArray[np.bool_] = field(default_factory=lambda: NO_RELATION, repr=False)
+    pressed: NDArray[np.bool_] = field(default_factory=lambda: NO_RELATION, repr=False)
+    rests: NDArray[np.bool_] = field(default_factory=lambda: NO_RELATION, repr=False)
+    worth: Array = field(default_factory=lambda: np.zeros(0), repr=False)
+    unheld: frozenset[Unheld] = field(default=frozenset(), repr=False)
 
     def __post_init__(self) -> None:
         for array in (self.levels, self.locks, self.touch, self.low, self.high, self.depths):
@@ -93,10 +107,50 @@ class Blocking:
             accepted |= np.outer(*both) | np.outer(*both[::-1])
         return replace(self, locks=self.locks & ~accepted)
 
+    @cached_property
+    def neighbours(self) -> tuple[tuple[int, ...], ...]:
+        """The units that each unit touches."""
+        return _rows(self.touch)
+
+    @cached_property
+    def carries(self) -> tuple[tuple[int, ...], ...]:
+        """The units that rest on each unit."""
+        return _rows(self.rests.T)
+
     def hangs(self, members: Sequence[int]) -> bool:
         """Whether units are connected by contacts."""
-        touch = self.touch[np.ix_(members, members)]
-        return int(connected_components(touch, directed=False)[0]) <= 1
+        left = {*members}
+        return len(left) < 2 or len(_reached(self.neighbours, next(iter(left)), left)) == len(left)
+
+    def stands(self, members: Sequence[int]) -> bool:
+        """Whether units stay together by themselves: whichever falls, one of them is below it, down
+        to a single one, or to several that hold each other, by which they are held."""
+        if not len(self.rests) or len(members) < 2:
+            return True
+        every, seen, root = {*members}, set[int](), members[0]
+        for unit in members:  # only the last one from which new ones are reached may carry all
+            if unit not in seen:
+                root = unit
+                seen |= _reached(self.carries, unit, every)
+        return len(_reached(self.carries, root, every)) == len(every)
+
+    def standing(self, axis: int, side: int) -> Blocking:
+        """The same graphs with what units rest on, if a side of an axis is up."""
+        falling = self.levels[axis].T if side > 0 else self.levels[axis]
+        return replace(self, rests=self.near & (self.pressed | (falling >= LOCKED)))
+
+    def puts_under(self, pile: Sequence[int], come: Sequence[int]) -> bool:
+        """Whether what comes is put under a pile, and does not rest on it."""
+        below = len(self.rests) > 0 and bool(self.rests[np.ix_(pile, come)].any())
+        return below and not self.rests[np.ix_(come, pile)].any()
+
+    def can_hold(self, one: Sequence[int], other: Sequence[int]) -> bool:
+        """Whether hands may hold both sides of a join: nothing is known that speaks against it."""
+        sides = frozenset(one), frozenset(other)
+        return not any(
+            (mine == sides[0] and theirs <= sides[1]) or (mine == sides[1] and theirs <= sides[0])
+            for mine, theirs in self.unheld
+        )
 
     def least(self, one: int, other: int) -> tuple[float, int, int]:
         """The direction in which a unit gets least deep into another: the depth [m], the axis, and
@@ -131,7 +185,37 @@ class Blocking:
             np.maximum.reduceat(self.high[order], starts),
             feet=self.feet and self.feet.grouped(groups),
             base=based[0] if based else -1,
+            rests=most(self.rests) if len(self.rests) else self.rests,
+            worth=np.maximum.reduceat(self.worth[order], starts) if len(self.worth) else self.worth,
+            unheld=frozenset(self._unheld_of(groups)),
         )
+
+    def _unheld_of(self, groups: Sequence[Sequence[int]]) -> Iterator[Unheld]:
+        """What no hand can hold, by the numbers of groups: what is made of whole groups."""
+        for mine, theirs in self.unheld:
+            here = frozenset(n for n, group in enumerate(groups) if not mine.isdisjoint(group))
+            if sum(len(groups[n]) for n in here) == len(mine) and here:
+                beside = (n for n, group in enumerate(groups) if not theirs.isdisjoint(group))
+                yield here, frozenset(beside)
+
+
+def _rows(table: NDArray[np.bool_]) -> tuple[tuple[int, ...], ...]:
+    """The numbers of the columns that are set in each row, that on the diagonal left out."""
+    return tuple(
+        tuple(n for n in np.flatnonzero(row).tolist() if n != number)
+        for number, row in enumerate(table)
+    )
+
+
+def _reached(ways: Sequence[Sequence[int]], first: int, among: Collection[int]) -> set[int]:
+    """The units among some that are reached from a first one, itself included."""
+    reached, todo = {first}, [first]
+    while todo:
+        for unit in ways[todo.pop()]:
+            if unit in among and unit not in reached:
+                reached.add(unit)
+                todo.append(unit)
+    return reached
 
 
 def blocking(source: InPlace) -> Blocking:
@@ -151,8 +235,11 @@ def blocking(source: InPlace) -> Blocking:
     touch = _touching(finder, convex, unit, count)
     near = touch | _within(finder, unit, count, NEAR)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
-    locks = levels >= LOCKED
-    return Blocking(labels, levels, locks, touch, *bounds, depths, hidden, near=near)
+    locks, pressed = levels >= LOCKED, np.zeros((count, count), bool)
+    drawn_in = overlaps.depths.finished > TOLERANCE
+    pressed[unit[overlaps.one[drawn_in]], unit[overlaps.other[drawn_in]]] = True
+    graphs = Blocking(labels, levels, locks, touch, *bounds, depths, hidden)
+    return replace(graphs, near=near, pressed=pressed | pressed.T)
 
 
 def rooms(source: InPlace, axis: int) -> Array:

@@ -25,7 +25,7 @@ import numpy as np
 
 from factory.api import Array, Pace
 from factory.apps.planning.divisions import Batch, Divisions, Late, TooLate, never
-from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
+from factory.apps.planning.subsets import LEVEL_PRICES, UNDER, Masks, Subsets
 from factory.theory.plant.approaches import MARGIN
 
 STATION = 0.06
@@ -235,6 +235,7 @@ class Best:
         level = self.task.subsets.level(self.task.divisions.axis, side, come, pile)
         cost = np.minimum(prices[:, axis], LEVEL_PRICES[level])
         before = self.piles[max(stops - 1, 0), axis, pile]
+        cost = cost + UNDER * self.task.subsets.under(pile, come)
         worth = before + self.made[1 - axis, come] + cost * LONG**2
         if self.bound < np.inf:
             time = self.stop[come] + self.step[come]

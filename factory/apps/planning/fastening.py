@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from factory.apps.planning.bases import EQUAL
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Units
+from factory.apps.planning.drivers import Drivers
 from factory.apps.planning.exact import Tree
 from factory.apps.planning.judging import Join, Judged
 from factory.apps.planning.parts import InPlace
@@ -36,14 +38,22 @@ class _Place:
     units: Units
     axis: int
 
+    def is_on(self, base: _Place) -> bool:
+        """Whether another place is the pile, of the pile, ... of this one."""
+        more = base.path[len(self.path) :]
+        return base.path[: len(self.path)] == self.path and not any(more)
+
 
 @dataclass
 class Fastening:
-    """Places screws in a tree of the other units of a product."""
+    """Places screws in a tree of the other units of a product; `late`: not in the smallest
+    sub-assembly in which they can be, but in the largest of which that is the base."""
 
     graphs: Blocking
     judged: Judged
     up: Stance
+    drivers: Drivers
+    late: bool = False
     places: list[_Place] = field(default_factory=list)
     joins: list[tuple[tuple[int, ...], int, Join]] = field(default_factory=list)
     driven: dict[tuple[int, ...], list[Join]] = field(default_factory=dict)
@@ -70,7 +80,9 @@ class Fastening:
         that they clamp, if they can get there and no later operation collides with them. Returns
         whether there is such a place."""
         needed = {unit for thread in threads for unit in thread.clamps}
-        return self._joined([t.screw for t in threads], needed, self.driven, (self.up.up,))
+        late = self.late and all(thread.into < 0 for thread in threads)
+        screws = [thread.screw for thread in threads]
+        return self._joined(screws, needed, self.driven, (self.up.up,), late)
 
     def put_on(self, ring: int, screw: int, near: Sequence[int]) -> bool:
         """Put a nut or a washer on a screw, from above or from below, in the smallest sub-assembly
@@ -84,22 +96,35 @@ class Fastening:
         needed: Collection[int],
         at: dict[tuple[int, ...], list[Join]],
         upright: Sequence[int],
+        late: bool = False,
     ) -> bool:
+        chosen: tuple[_Place, list[Join]] | None = None
         for place in self.places:
-            there = self._with_screws(place.units, place.path)
-            if not {*needed} <= {*there}:
+            if chosen is not None and not (late and place.is_on(chosen[0])):
                 continue
-            joins = list[Join]()
-            for unit in come:
-                join = self._way(unit, there, place.axis, upright)
-                if join is None or not self._passes(unit, place):
-                    break
-                joins.append(join)
-                there = (*there, unit)
-            else:
-                at.setdefault(place.path, []).extend(joins)
-                return True
-        return False
+            if {*needed} <= {*self._with_screws(place.units, place.path)}:
+                joins = self._ways(come, place, upright, at is self.driven)
+                chosen = (place, joins) if joins else chosen
+        if chosen is not None:
+            at.setdefault(chosen[0].path, []).extend(chosen[1])
+        return chosen is not None
+
+    def _ways(
+        self, come: Sequence[int], place: _Place, upright: Sequence[int], turned: bool
+    ) -> list[Join]:
+        """The motions of some units to a place, one after the other; empty if one cannot get there,
+        or a driver to it (`turned`)."""
+        joins = list[Join]()
+        there = self._with_screws(place.units, place.path)
+        for unit in come:
+            join = self._way(unit, there, place.axis, upright)
+            if join is None or not self._passes(unit, place):
+                return []
+            if turned and not self.drivers.reach(unit, join.direction, there):
+                return []
+            joins.append(join)
+            there = (*there, unit)
+        return joins
 
     def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
         """Units, and the screws that are driven in at a path or below it, with their rings."""
@@ -160,12 +185,13 @@ class Fastening:
         return self._with_rings(tree, path)
 
     def _with_rings(self, tree: Tree, path: tuple[int, ...]) -> Tree:
-        """A sub-assembly with its nuts and washers: those from above are inserted one after the
-        other, and it is lowered onto each of those from below. Each time its axis turns, so that
-        it may have to be handed over first."""
+        """A sub-assembly with its nuts and washers: those from above, or from the side, are
+        inserted one after the other, and it is lowered onto each of those from below. Each time its
+        axis turns, so that it may have to be handed over first."""
         joins = self.put.get(path, [])
-        above = [join.come[0] for join in joins if join.direction[1] == self.up.up]
-        below = [join.come[0] for join in joins if join.direction[1] != self.up.up]
+        under = [join.lowered and join.direction[1] != self.up.up for join in joins]
+        above = [join.come[0] for join, is_below in zip(joins, under, strict=True) if not is_below]
+        below = [join.come[0] for join, is_below in zip(joins, under, strict=True) if is_below]
         if self._slides_below(path) and (bool(above) + len(below)) % 2:
             tree = (tree,)
         tree = (tree, *above) if above else tree
@@ -194,11 +220,24 @@ def renumbered(judged: Judged, units: Sequence[int]) -> Judged:
 
 
 def fastened(
-    graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float
+    graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float, drivers: Drivers
 ) -> tuple[Judged, tuple[int, ...]]:
     """A tree of all other units with the screws in it, and their nuts, and those of both for which
-    there is no place."""
-    work, left = Fastening(graphs, judged, judged.stance), list[int]()
+    there is no place. They come last where that takes no longer."""
+    early, late = (_fastened(graphs, judged, threads, dwell, drivers, n) for n in (False, True))
+    equal = len(late[1]) <= len(early[1]) and late[0].seconds <= EQUAL * early[0].seconds
+    return late if equal else early
+
+
+def _fastened(
+    graphs: Blocking,
+    judged: Judged,
+    threads: Sequence[Thread],
+    dwell: float,
+    drivers: Drivers,
+    late: bool,
+) -> tuple[Judged, tuple[int, ...]]:
+    work, left = Fastening(graphs, judged, judged.stance, drivers, late), list[int]()
     alike: dict[tuple[str, int], list[Thread]] = {}
     for one in threads:
         alike.setdefault((one.kind, one.into), []).append(one)

@@ -21,7 +21,16 @@ from factory.apps.planning.cannot import Units
 from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import RELAY, Best, Tree, TreeTask
 from factory.apps.planning.judging import Judged, Site
-from factory.apps.planning.subsets import APART, BLOCKED, LOOSE, PASSES, ROOT_AXIS, TIPS, subsets
+from factory.apps.planning.subsets import (
+    APART,
+    BLOCKED,
+    FALLS,
+    LOOSE,
+    PASSES,
+    ROOT_AXIS,
+    TIPS,
+    subsets,
+)
 
 Sets = NDArray[np.bool_]
 
@@ -61,10 +70,11 @@ class Divider:
         return (other, one) if self.graphs.base in other else (one, other)
 
     def _unsound(self, members: list[int]) -> float:
-        """The price of a side that is in pieces, or would tip over."""
+        """The price of a side that is in pieces, would tip over, or loses something."""
         feet = self.graphs.feet
         tips = feet is not None and len(members) > 1 and bool(feet.joined(members).tips[0])
-        return APART * (not self.graphs.hangs(members)) + TIPS * tips
+        falls = FALLS * (not self.graphs.stands(members))
+        return APART * (not self.graphs.hangs(members)) + TIPS * tips + falls
 
     def _candidates(
         self, units: NDArray[np.int64], axes: tuple[int, ...], random: np.random.Generator

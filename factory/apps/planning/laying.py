@@ -25,6 +25,8 @@ from factory.api import (
     pace,
 )
 from factory.apps.few_robots.sharing import with_lines
+from factory.apps.planning.bases import EQUAL
+from factory.apps.planning.blocking import Unheld
 from factory.apps.planning.exact import Tree
 from factory.apps.planning.judging import Judged
 from factory.apps.planning.parts import InPlace
@@ -35,7 +37,7 @@ from factory.apps.planning.writing import Tree as LabelTree
 from factory.floor.geometry.product import product_geometry
 from factory.theory.lang.pag_reader import read_pag
 
-LAID = 120
+LAID = 160
 """Trees are laid out until they have more robots together, unless a time is given."""
 
 ALIKE = 0.01
@@ -86,10 +88,15 @@ class LaidOut:
         except FactoryError:
             return inf
 
+    @property
+    def aims(self) -> Mapping[Aim, float]:
+        """Its figure for each aim."""
+        return {"cycle": self.seconds, "robots": float(self.robots), "floor": self.area}
+
     def rank(self, aim: Aim) -> tuple[float, ...]:
         """The rank of a factory, less is better: blocked operations, sub-assemblies that cannot be
         held, the aim, then the number of kinds of sub-assemblies."""
-        aims = {"cycle": self.seconds, "robots": float(self.robots), "floor": self.area}
+        aims = dict(self.aims)
         order = [aims.pop(aim), *aims.values()]
         rough = [float(np.round(np.log(max(x, 1e-9)) / ALIKE)) for x in order]
         return self.blocked, self.held, rough[0], self.kinds, *rough[1:]
@@ -158,6 +165,13 @@ class Layouts:
         apart = [f"{listing(line, 12)} have a driver each: {why}" for line in laid.lines]
         return replace(alone, apart=(*laid.apart, *apart))
 
+    def unheld(self, laid: LaidOut) -> frozenset[Unheld]:
+        """What no hand can hold, by the numbers of units, and what it is joined to then."""
+        pairs = [(g.parts, g.beside) for g in laid.project.no_grips if not g.line]
+        of = {part.label: n for n, (_, u) in enumerate(self.source.units()) for part in u}
+        sides = [[frozenset(map(of.__getitem__, side)) for side in pair] for pair in pairs]
+        return frozenset((mine, theirs - mine) for mine, theirs in sides)
+
     def labelled(self, tree: Tree) -> LabelTree:
         """A tree with the labels of units in place of their numbers."""
         if isinstance(tree, int):
@@ -188,30 +202,41 @@ class Layouts:
         budget: Allowance,
         report: Callable[[LaidOut], None] = lambda _: None,
     ) -> LaidOut:
-        """The best of some trees. As many are laid out as the budget permits, at least the first:
-        those of LAID robots together, or as many as time permits, where the next one is assumed to
-        take as long as the longest did. A KeyboardInterrupt ends the layout of any but the
-        first."""
-        best: LaidOut | None = None
+        """The best of some trees, or of those about as good the one that makes most sense. As many
+        are laid out as the budget permits, at least the first: those of LAID robots together, or as
+        many as time permits, where the next one is assumed to take as long as the longest did. A
+        KeyboardInterrupt ends the layout of any but the first."""
+        every: list[LaidOut] = []
         longest, robots = 0.0, 0
         for judged in trees:
             robots += judged.robots
             enough = robots > LAID if budget.seconds == inf else budget.left < longest
-            if best is not None and (enough or budget.left == 0.0):
+            if every and (enough or budget.left == 0.0):
                 break
             begin = perf_counter()
             try:
                 laid = self.or_alone(self.of(judged))
-                best = laid if best is None else min(best, laid, key=lambda one: one.rank(aim))
+                laid.rank(aim)
             except KeyboardInterrupt:
-                if best is None:
+                if not every:
                     raise
                 break
-            report(best)
+            every.append(laid)
+            report(best_of(every, aim))
             longest = max(longest, perf_counter() - begin)
-        if best is None:
-            raise ValueError("there is no tree to lay out")
-        return best
+        return best_of(every, aim)
+
+
+def best_of(every: Sequence[LaidOut], aim: Aim) -> LaidOut:
+    """The best of some layouts by rank or, of those whose aim is equal for a person, the one of
+    whose sub-assemblies the least falls."""
+    best = min(every, key=lambda one: one.rank(aim))
+    equal = [
+        one
+        for one in every
+        if one.rank(aim)[:2] == best.rank(aim)[:2] and one.aims[aim] <= EQUAL * best.aims[aim]
+    ]
+    return min(equal or [best], key=lambda one: (one.judged.senseless, one.rank(aim)))
 
 
 def _lines(project: Project, screws: Sequence[str]) -> list[tuple[str, ...]]:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from factory.api import (
-    PAG,
     Allowance,
     Array,
     Diagnostic,
@@ -32,31 +31,30 @@ from factory.apps.planning.blocking import (
 )
 from factory.apps.planning.cannot import Direction, Interlock, Removal, removal
 from factory.apps.planning.exact import Expected
-from factory.apps.planning.fastening import fastened, fasteners, renumbered
+from factory.apps.planning.falling import held_by, senseless
+from factory.apps.planning.fastening import fasteners
 from factory.apps.planning.judging import Join, Judged
-from factory.apps.planning.laying import LaidOut, Layouts
+from factory.apps.planning.laying import LaidOut, Layouts, best_of
 from factory.apps.planning.parts import InPlace, refuse_hidden
 from factory.apps.planning.posing import (
     Pose,
     along,
+    falling,
     loose,
+    onto,
     posed,
     said,
     screwing,
     sharing,
     toppling,
 )
-from factory.apps.planning.searching import Aim, Sought, Trees, budget_of, trees
+from factory.apps.planning.searching import Aim, budget_of
+from factory.apps.planning.seeking import Seeking
 from factory.apps.planning.standing import feet
-from factory.apps.planning.subsets import BLOCKED, ROOT_AXIS, Stance, stances
-from factory.apps.planning.threads import threads
-from factory.apps.planning.turning import only
-from factory.apps.planning.writing import Tree, planned_product, screws_in
+from factory.apps.planning.subsets import MOST, stances
+from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
-from factory.floor.geometry.product import product_geometry
-from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
-from factory.theory.compiler.expanding import expand
 
 DECOMPOSING = "decomposing parts into convex bodies"
 """The name of the stage after a tree is found: layouts and runs need these bodies, ways do not."""
@@ -64,8 +62,9 @@ DECOMPOSING = "decomposing parts into convex bodies"
 LAYING = "laying out"
 """The name of the last stage of planning."""
 
-DWELL = 1.0
-"""The time that a driver turns a screw [s], as its template states."""
+HELD, AGAIN = 4, 2
+"""So often trees of a few units are sought again in which what no hand can hold is joined
+otherwise, and so many of these are laid out."""
 
 
 @dataclass(frozen=True)
@@ -114,10 +113,10 @@ class PlanFigures:
     """The figures of a plan: the number of operations; of those that are `blocked`, that have parts
     which were drawn into each other pass through each other (`through`) or get a little deeper
     (`left_out`), and that scrape; of sub-assemblies that are not connected (`apart`), would tip
-    over (`tips`), are handed over to be turned (`relays`), or cannot be held by any hand
-    (`not_held`, None without layouts); of trees that were laid out; of robots; the cycle time
-    expected from sizes and the predicted one [s], and the floor area [m²] (None without
-    layouts)."""
+    over (`tips`), are handed over to be turned (`relays`), of which something falls (`falls`), or
+    that no hand can hold (`not_held`, None without layouts); of trees that were laid out; of
+    robots; the cycle time expected from sizes and the predicted one [s], and the floor area [m²]
+    (None without layouts)."""
 
     operations: int
     blocked: int
@@ -129,6 +128,7 @@ class PlanFigures:
     relays: int
     robots: int
     expected: float
+    falls: int = 0
     not_held: int | None = None
     layouts: int = 0
     cycle: float | None = None
@@ -192,49 +192,38 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     def graph(source: InPlace) -> Blocking:
         return blocking(source).allowing(asked.allow)
 
-    pose = posed(source, graphs, asked.up, graph)
+    screws = () if asked.screws is None else fasteners(source, asked.screws)
+    pose = posed(source, graphs, asked.up, graph, screws)
     if pose.stuck:
         return CannotAssemble(pose.stuck, removal(graphs), pose.needs)
     planned = _planned(pose, asked, budget)
-    notes = (*said(pose, planned.orientation), *toppling(planned.figures.tips))
-    notes += (*loose(planned.figures.apart), *sharing(planned.lines), *planned.alone)
+    figures = planned.figures
+    notes = (*said(pose, planned.orientation), onto(leaves(planned.tree)[0]))
+    notes += (*toppling(figures.tips), *falling(figures.falls, figures.operations - 1))
+    notes += (*loose(figures.apart), *sharing(planned.lines), *planned.alone)
     notes += screwing(screws_in(planned.tree), planned.screws)
     return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
 def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
     source = pose.source
-    base = pose.graphs.labels.index(asked.base) if asked.base else -1
     stands = feet([parts for _, parts in source.units()], along(pose.up))
-    graphs = replace(pose.graphs, feet=stands, base=base)
+    base = pose.graphs.labels.index(asked.base) if asked.base else -1
+    graphs = replace(pose.graphs, feet=stands, base=base).standing(*pose.up)
+    screws = _screws(source, graphs, asked)
+    named, firm = tuple(graphs.labels[n] for n in screws), held_by(graphs, screws)
     templates = all_templates() if asked.templates is None else asked.templates
-    expected = Expected(Pace.of(asked.settings))
-    seen = [0]
+    expected, seen, laid = Expected(Pace.of(asked.settings)), [0], [0]
 
     def told(judged: Judged) -> None:
         seen[0] += 1
         words = f"{judged.robots} robots, about {judged.seconds:.1f} s"
         asked.told("searching for a tree", seen[0], None, words)
 
-    def sought_for(screws: Sequence[int], plain: Collection[int] = ()) -> Trees:
-        made = threads(source, graphs, screws, plain)
-        after = {*screws, *(ring for one in made for ring in one.follow)}
-        rest = [n for n in range(len(graphs)) if n not in after]
-        groups = [[n, *(one.screw for one in made if one.into == n)] for n in rest]
-        others = graphs.grouped(groups) if after else graphs
-        prices = _kept_prices(only(source, others.labels), templates)
-        task = Sought(others, expected, prices, asked.aim, budget, told, stances(pose.up))
-        candidates = trees(task)
-        if not screws:
-            return candidates
-        joined = [fastened(graphs, renumbered(j, rest), made, DWELL) for j in candidates.all]
-        if all(left for _, left in joined):
-            lost = min((left for _, left in joined), key=len)
-            return sought_for([n for n in screws if n not in lost], {*plain, *lost})
-        return Trees(tuple(judged for judged, left in joined if not left), optimal=False)
-
-    screws = _screws(source, graphs, asked)
-    sought = sought_for(screws)
+    search: tuple[Any, ...] = (screws, stances(pose.up), expected, templates, asked.aim, told)
+    seeking: Seeking | None = Seeking(source, graphs, *search)
+    assert seeking is not None
+    sought = seeking.trees(budget)
     if asked.lay_out:
         asked.told(DECOMPOSING, 1, None, "")
 
@@ -242,11 +231,9 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         asked.told(DECOMPOSING, done, total, "meshes")
 
     layouts = Layouts(source, templates, asked.settings, decomposed)
-    named = tuple(graphs.labels[n] for n in screws)
     if not asked.lay_out:
-        made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
+        made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0, firm)
         return replace(made, screws=named)
-    laid = [0]
 
     def said(best: LaidOut) -> None:
         laid[0] += 1
@@ -254,34 +241,15 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         asked.told(LAYING, laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget, said)
-    return replace(_result(pose, best, sought.optimal, laid[0]), screws=named)
-
-
-def _kept_prices(source: InPlace, templates: Mapping[str, Template]) -> Callable[[Stance], Array]:
-    """The prices (2, n) of a source's units by stance, if the inputs of each come along x, or y, of
-    the floor. Sub-trees that are kept have operations that may be blocked along one axis, or on one
-    side, and not on another; all other units cost nothing."""
-    kept = {keep.label: keep for keep in source.kept}
-    labels = [label for label, _ in source.units()]
-
-    @cache
-    def price(label: str, stance: Stance) -> float:
-        parts = tuple(part for part in source.parts if part.label in kept[label].parts)
-        alone = replace(source, parts=parts, kept=(kept[label],))
-        pag = PAG(label, planned_product(alone, label, stance.rotation).pag.nodes)
-        judged = matings(expand(pag, templates), product_geometry(pag, source.files))
-        return BLOCKED * len(judged.of_kind("blocked"))
-
-    def prices(stance: Stance) -> Array:
-        x, y, z = stance.axes
-        table = np.zeros((2, len(labels)))
-        for number, label in enumerate(labels):
-            if label in kept:
-                table[ROOT_AXIS, number] = price(label, stance)
-                table[1 - ROOT_AXIS, number] = price(label, Stance((y, x, z), stance.up))
-        return table
-
-    return prices
+    for _ in range(HELD):
+        seeking = seeking.without(layouts.unheld(best)) if seeking else None
+        if seeking is None or budget.left == 0.0 or len(graphs) - len(screws) > MOST:
+            break
+        again = seeking.trees(replace(budget, spent=0))
+        other = layouts.best(again.all[:AGAIN], asked.aim, budget, said)
+        if best_of([best, other], asked.aim) is other:
+            best, sought = other, again
+    return replace(_result(pose, best, sought.optimal, laid[0], firm), screws=named)
 
 
 def _screws(source: InPlace, graphs: Blocking, asked: PlanOptions) -> tuple[int, ...]:
@@ -294,7 +262,7 @@ def _screws(source: InPlace, graphs: Blocking, asked: PlanOptions) -> tuple[int,
     return numbers if len(numbers) < len(graphs) else ()
 
 
-def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
+def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int, firm: Blocking) -> Planned:
     judged = laid.judged
     figures = PlanFigures(
         operations=len(judged.joins),
@@ -307,6 +275,7 @@ def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
         relays=judged.relays,
         robots=laid.robots if layouts else judged.robots,
         expected=judged.seconds,
+        falls=senseless(firm, judged.tree)[0],
         not_held=laid.held if layouts else None,
         layouts=layouts,
         cycle=laid.seconds if layouts and np.isfinite(laid.seconds) else None,

@@ -3,6 +3,7 @@ along no axis."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -12,6 +13,7 @@ from factory.api import Array, Diagnostic, InputError, listing
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
+from factory.apps.planning.shanks import shank_of
 from factory.apps.planning.standing import TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
 
@@ -43,11 +45,13 @@ def posed(
     graphs: Blocking,
     up: Direction | None,
     graphs_of: Callable[[InPlace], Blocking],
+    screws: Sequence[str] = (),
 ) -> Pose:
     """The pose in which a source is planned. `graphs`: its blocking graphs as it was drawn;
-    `graphs_of` computes those of another pose. Raises InputError (Usage) if the product tips over
-    with `up` upwards."""
-    drawn = up or AS_DRAWN
+    `graphs_of` computes those of another pose; `screws`: the units that are driven in, from above
+    if the product can stand so and few of them come from above as it is drawn. Raises InputError
+    (Usage) if the product tips over with `up` upwards."""
+    drawn = up or _for_screws(source, screws)
     tips = overhang(source.parts, along(drawn))
     if up is not None and tips > TIPS:
         message = f"the product tips over if {named(up)} is up: {_beyond(tips)}"
@@ -72,6 +76,18 @@ def posed(
             if not pose.stuck and pose.tips <= TIPS:
                 return pose
     return Pose(source, np.eye(3), drawn, graphs, stuck, tuple(needs.items()), tips)
+
+
+def _for_screws(source: InPlace, screws: Sequence[str]) -> Direction:
+    """The side up that most screws come from, if the product stands then, and those that come from
+    above as it is drawn are not half as many."""
+    shanks = [shank_of(units[0]) for label, units in source.units() if label in screws]
+    ways = Counter(shank.way for shank in shanks if shank is not None)
+    if not ways:
+        return AS_DRAWN
+    most = max(SIDES, key=lambda side: ways[side])
+    few = 2 * ways[AS_DRAWN] < ways[most]
+    return most if few and overhang(source.parts, along(most)) <= TIPS else AS_DRAWN
 
 
 def _freed(
@@ -151,6 +167,17 @@ def loose(count: int) -> tuple[str, ...]:
     """A note on sub-assemblies whose parts do not touch each other, if there are any."""
     some = f"{count} sub-assemblies have" if count > 1 else "a sub-assembly has"
     return (f"{some} parts that touch none of its others: no tree avoids this",) if count else ()
+
+
+def onto(base: str) -> str:
+    """A note on the base."""
+    return f"{base} is the base, onto which all others come (--base)"
+
+
+def falling(count: int, every: int) -> tuple[str, ...]:
+    """A note on sub-assemblies of which something would fall, if there are any."""
+    some = f"{count} of {every} sub-assemblies need" if every > 1 else "the sub-assembly needs"
+    return (f"{some} a hand or glue until more is there",) if count else ()
 
 
 def toppling(count: int) -> tuple[str, ...]:

@@ -32,11 +32,13 @@ BOUNDS: dict[Aim, tuple[float, ...]] = {
 SEVERAL = 3
 """The most stances that are tried for each bound."""
 
-EVEN = (1.0, 0.3, 0.0)
-"""How even divisions of many units are preferred to be, in order: 1 for halves, 0 for any."""
+EVEN, UNEVEN, LARGE = (1.0, 0.3), (0.0, 0.1), 64
+"""How even divisions of many units are preferred to be, in order, 1 for halves; and at last, 0 for
+any, 0.1 from LARGE units on: dividing by single units takes much longer."""
 
-CANDIDATES = 40
-"""The search for a tree ends after so many candidates for each unit: neighbourhoods of a tree."""
+CANDIDATES, FEWER, MANY = 40, 5, 40
+"""The search for a tree ends after so many candidates for each unit: neighbourhoods of a tree; from
+MANY units on after fewer for each further one."""
 
 PROVING, GROWING = 0.3, 0.6
 """Shares of the budget after which proofs are abandoned, and the local search ends: the rest is for
@@ -57,9 +59,10 @@ UnitPrices = Callable[[Stance], Array]
 def budget_of(
     units: int, seconds: float | None = None, stopped: Callable[[], bool] = lambda: False
 ) -> Allowance:
-    """The budget of a search: CANDIDATES for each unit, or the time that the user gave [s]. A
+    """The budget of a search: candidates for each unit, or the time that the user gave [s]. A
     search that is `stopped` ends at once."""
-    effort = CANDIDATES * units if seconds is None else inf
+    several = CANDIDATES * min(units, MANY) + FEWER * max(units - MANY, 0)
+    effort = several if seconds is None else inf
     return Allowance(effort / GROWING, inf if seconds is None else seconds, stopped)
 
 
@@ -83,9 +86,9 @@ class Sought:
 
 @dataclass(frozen=True)
 class Trees:
-    """The trees of least price, the best by estimate first. `optimal`: whether it is proved that no
-    tree has a lower price and that, within the bound of each tree, none has fewer robots or smaller
-    sub-assemblies."""
+    """The trees of least price, the best by estimate first, the others in its stance after it.
+    `optimal`: whether it is proved that no tree has a lower price and that, within the bound of
+    each tree, none has fewer robots or smaller sub-assemblies."""
 
     all: tuple[Judged, ...]
     optimal: bool
@@ -113,7 +116,24 @@ def trees(sought: Sought) -> Trees:
     ranks = {j: (j.price, j.robots if by_robots else 0, j.seconds, j.robots) for j in kept.values()}
     least = min(judged.price for judged in ranks)
     best = [judged for judged in ranks if judged.price == least]
-    return Trees(tuple(sorted(best, key=ranks.__getitem__)), optimal)
+    best.sort(key=ranks.__getitem__)
+    of_stance = {stance: n for n, stance in enumerate(dict.fromkeys(j.stance for j in best))}
+    return Trees(tuple(sorted(best, key=lambda judged: of_stance[judged.stance])), optimal)
+
+
+def least(sought: Sought) -> tuple[float, float] | None:
+    """The least price of a tree of a few units, and the least expected cycle at that price [s];
+    None if that takes too long to know."""
+
+    def late() -> bool:
+        return sought.budget.time_used > PROVING
+
+    try:
+        table = subsets(sought.graphs)
+        ranks = _ranks(sought, table, False, late) or _ranks(sought, table, True, late)
+    except TooLate:
+        return None
+    return min(((rank.price, rank.seconds) for rank in ranks), default=(inf, inf))
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,12 +221,16 @@ def _grown(sought: Sought) -> Iterator[Judged]:
     late = late_after(GROWING)
     random = np.random.default_rng(0)
     first: list[Judged] = []
+    evenness: tuple[float, ...] = (*EVEN, UNEVEN[len(sought.graphs) >= LARGE])
     for stance in sought.stances:
-        for even in EVEN:
+        for number, even in enumerate(evenness):
             site = sought.site(stance)
             tree = divided(site, random, even)
             first.append(site.judged(tree))
-            if late() or first[-1].price == 0.0:
+            if late():
+                break
+            if first[-1].hard == 0.0:
+                evenness = evenness[number:]
                 break
         if late():
             break

@@ -46,6 +46,11 @@ class Shank:
     headed: bool
 
     @property
+    def way(self) -> tuple[int, int]:
+        """The axis, and the side of it, to which a screw with a head leaves."""
+        return self.axis, 1 if self.ends[0, self.axis] > self.ends[1, self.axis] else -1
+
+    @property
     def points(self) -> Array:
         """Points (n, 3) on its centre line."""
         first, last = self.ends
@@ -165,8 +170,9 @@ def _among(parts: Sequence[PlacedPart], named: Sequence[str]) -> Iterator[str]:
             yield part.label
         elif meaning != Says.OTHER:
             shank = shank_of(part, bare=meaning == Says.PERHAPS)
-            others = (other for other in parts if other is not part)
-            if shank and _is_massive(part, shank) and any(map(shank.is_in, others)):
+            others = [other for other in parts if other is not part]
+            larger = [other for other in others if other.solid.mass > part.solid.mass]
+            if shank and larger and _is_massive(part, shank) and any(map(shank.is_in, others)):
                 yield part.label
 
 

@@ -16,6 +16,7 @@ from factory.api import (
     Diagnostic,
     Indices,
     InputError,
+    Product,
     Solid,
     Template,
     collector_paused,
@@ -200,13 +201,28 @@ def placed(
     """The parts of a PAG, each as a kind of its own, and warnings. Raises InputError (BadMesh,
     BadValue)."""
     product = product_geometry(pag, files, decomposed=False)
-    if can_decompose() and any(drawn(solid) is None for solid in product.solids.values()):
-        product = product_geometry(pag, files)  # what is near an open mesh is known by its bodies
+    solids = dict(product.solids)
+    if can_decompose() and (beside := _beside_open(product)):
+        nodes = [node for node in pag.parts() if node.label in beside]
+        whole = Assembly(pag.root, "mate", tuple(node.label for node in nodes))
+        solids |= product_geometry(replace(pag, nodes=(whole, *nodes)), files).solids
     parts = []
     for node in pag.parts():
-        solid = product.solids[node.label]
+        solid = solids[node.label]
         parts.append(PlacedPart(node.label, *surface(solid), node.label, solid, node))
     return tuple(parts), (*product.warnings, *(() if can_decompose() else _hulls(parts)))
+
+
+def _beside_open(product: Product) -> set[str]:
+    """The parts that bound no volume, and those whose boxes meet theirs: what these block is known
+    by convex bodies."""
+    solids = product.solids
+    boxes = [solid for solid in solids.values() if drawn(solid) is None]
+    return {
+        label
+        for label, solid in solids.items()
+        if any((solid.low <= box.high).all() and (box.low <= solid.high).all() for box in boxes)
+    }
 
 
 def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:

@@ -3,6 +3,7 @@ orientations of a product on the floor."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import permutations
@@ -54,16 +55,17 @@ Masks = NDArray[np.int64]
 MOST = 16
 """The most units that have tables."""
 
-BLOCKED, PASSES, LOOSE = 1e6, 1e4, 1e2
-"""The price of an operation with accepted clashes (`check` calls it blocked); with parts that were
-drawn into each other and pass through each other; with such parts that get a little deeper. A relay
-costs less than any of these."""
+BLOCKED, UNHELD, PASSES, LOOSE = 1e6, 5e4, 1e4, 1e2
+"""The price of an operation with accepted clashes (`check` calls it blocked); with a side that no
+hand can hold; with parts that were drawn into each other and pass through each other; with such
+parts that get a little deeper. A relay costs less than any of these."""
 
-LEVEL_PRICES = np.array([0.0, LOOSE, PASSES, BLOCKED, np.inf])
+LEVEL_PRICES = np.array([0.0, LOOSE, PASSES, UNHELD, BLOCKED, np.inf])
 """The prices of an operation by its level: free, as named above, and impossible."""
 
-APART, TIPS = 1e5, 2e4
-"""The price of a sub-assembly that is not connected, and of one that would tip over by itself."""
+APART, TIPS, FALLS, UNDER = 1e5, 2e4, 10.0, 5.0
+"""The price of a sub-assembly that is not connected, of one that would tip over by itself, of one
+of which something would fall, and of an operation that puts a part under a pile."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +73,10 @@ class Subsets:
     """Tables by subset. `ways` (4, 3 axes, 2 sides, s): the units that block a subset which leaves
     along an axis to the upper or lower side: those that lock it, and those with a level of at least
     DEEPER, LOCKED and CLASHES; `hangs` (s,): whether it is connected; `low`, `high` (3, s): its box
-    [m]; `size` (s,): its number of units; `tips` (s,): whether it would tip over; `based` (s,):
-    whether it contains the base."""
+    [m]; `size` (s,): its number of units; `tips` (s,): whether it would tip over; `stands` (s,):
+    whether nothing of it would fall; `based` (s,): whether it contains the base; `unheld`: subsets
+    that no hand can hold, and what they are joined to then; `below` (s,): the
+    units on which a subset rests, empty if that does not matter."""
 
     count: int
     ways: Masks = field(repr=False)
@@ -81,12 +85,15 @@ class Subsets:
     high: Array = field(repr=False)
     size: Masks = field(repr=False)
     tips: NDArray[np.bool_] = field(repr=False)
+    stands: NDArray[np.bool_] = field(repr=False)
     based: NDArray[np.bool_] = field(repr=False)
+    unheld: tuple[tuple[int, int], ...] = ()
+    below: Masks = field(default_factory=lambda: np.zeros(0, np.int64), repr=False)
 
     @cached_property
     def penalty(self) -> Array:
         """The prices (s,) of sub-assemblies in pieces, or that would tip over."""
-        prices = APART * ~self.hangs + TIPS * self.tips
+        prices = APART * ~self.hangs + TIPS * self.tips + FALLS * ~self.stands
         prices[-1] = 0.0
         return np.asarray(prices)
 
@@ -98,6 +105,13 @@ class Subsets:
     def extent(self, axis: int) -> Array:
         """The length of each subset along an axis (s,) [m]."""
         return np.asarray(self.high[axis] - self.low[axis])
+
+    def under(self, pile: Masks, come: Masks) -> NDArray[np.bool_]:
+        """Whether what comes (k,) is put under a pile, and does not rest on it."""
+        if not len(self.below):
+            return np.zeros(len(pile), bool)
+        put = ((self.below[pile] & come) != 0) & ((self.below[come] & pile) == 0)
+        return np.asarray(put)
 
     def separable(self, one: Masks, other: Masks) -> NDArray[np.bool_]:
         """Whether two sides (k,) are free of each other along some axis, or their clashes are
@@ -112,8 +126,12 @@ class Subsets:
         """The levels (k,) of blocking, by which LEVEL_PRICES has the prices, of subsets that leave
         along an axis to the upper (0) or lower (1) side, past those that stay."""
         levels = np.zeros(len(going), np.uint8)
-        for number, ways in ((1, 1), (2, 2), (3, 3), (4, 0)):
-            levels[(self.ways[ways, axis, side][going] & staying) != 0] = number
+        for mine, theirs in self.unheld:
+            for one, other in ((going, staying), (staying, going)):
+                levels[(one == mine) & (other & theirs == theirs)] = 3
+        for number, ways in ((1, 1), (2, 2), (4, 3), (5, 0)):
+            met = (self.ways[ways, axis, side][going] & staying) != 0
+            levels[met] = np.maximum(levels[met], number)
         return levels
 
 
@@ -142,7 +160,16 @@ def subsets(graphs: Blocking) -> Subsets:
         members[here] = members[before] + 1
     tips = np.zeros(size, bool) if graphs.feet is None else graphs.feet.subsets()
     based = (np.arange(size) >> max(graphs.base, 0) & 1 == 1) & (graphs.base >= 0)
-    return Subsets(count, ways, _hanging(graphs.touch, members), low, high, members, tips, based)
+    stands = _hanging(graphs.rests, members) if len(graphs.rests) else np.ones(size, bool)
+    hangs = _hanging(graphs.touch, members)
+    unheld = tuple((_mask(mine), _mask(theirs)) for mine, theirs in graphs.unheld)
+    below = _unions(graphs.rests) if len(graphs.rests) else np.zeros(0, np.int64)
+    tables = tips, stands, based, unheld, below
+    return Subsets(count, ways, hangs, low, high, members, *tables)
+
+
+def _mask(units: Iterable[int]) -> int:
+    return sum(1 << unit for unit in units)
 
 
 def _unions(table: NDArray[np.bool_]) -> Masks:
@@ -158,7 +185,7 @@ def _unions(table: NDArray[np.bool_]) -> Masks:
 
 def _hanging(touch: NDArray[np.bool_], members: Masks) -> NDArray[np.bool_]:
     """Which subsets are connected (s,): those in which some unit touches the rest, and the rest is
-    connected."""
+    connected. So are those of which all units rest on one, in a relation that is not symmetric."""
     count = len(touch)
     reach = (touch & ~np.eye(count, dtype=bool)) @ (1 << np.arange(count, dtype=np.int64))
     hangs = members <= 1

@@ -239,7 +239,7 @@ def test_a_thread_that_is_drawn_solid_is_allowed_and_runs(
     done = run(*words, "-o", tmp_path / "out")
     assert done.status == 0, done.err
     text = Path(done.json["pag"]).read_text()
-    assert "screw ( sub1, bolt_M10 )" in text and "allow (" in text
+    assert "screw ( cover_on_base, bolt_M10 )" in text and "allow (" in text
     assert run("run", done.json["pag"], "--units", 1, "-q").status == 0
 
 

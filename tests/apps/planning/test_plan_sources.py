@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import factory
 from factory.apps.importing.alike import alike
+from factory.apps.planning import source
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
@@ -529,3 +530,58 @@ def test_json_says_what_was_found(run: Terminal, tmp_path: Path) -> None:
     document = json.loads(done.out)
     assert {"pag", "parts", "kinds", "notes", "approaches", "files", "warnings"} <= set(document)
     assert io.StringIO(done.out).read().count("\n") == 1
+
+
+def test_only_what_is_beside_an_open_mesh_is_decomposed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The ways of all other parts are judged by the volumes that their meshes bound."""
+    meshes = {f"block{n}": block((0, 0, 10 * n), (20, 20, 10 * n + 10)) for n in range(4)}
+    meshes["block3"].update_faces(np.arange(12) > 5)
+    for label, mesh in meshes.items():
+        mesh.export(tmp_path / f"{label}.stl")
+    asked = []
+    made = source.product_geometry
+
+    def seen(pag: factory.PAG, *words: Any, **named: Any) -> Any:
+        if named.get("decomposed", True):
+            asked.append({node.label for node in pag.parts()})
+        return made(pag, *words, **named)
+
+    monkeypatch.setattr(source, "can_decompose", lambda: True)
+    monkeypatch.setattr(source, "product_geometry", seen)
+    found = read_source(tmp_path, TEMPLATES, SourceOptions("mm"))
+    assert asked == [{"block2", "block3"}] and len(found.parts) == 4
+
+
+@pytest.mark.parametrize(
+    ("folder", "name"), [("lamp/stl", "lamp"), ("lamp/STLs", "lamp"), ("lamp/arm", "arm")]
+)
+def test_a_product_is_not_called_by_a_format(folder: str, name: str, tmp_path: Path) -> None:
+    place = tmp_path / folder
+    place.mkdir(parents=True)
+    for label, mesh in table().items():
+        mesh.export(place / f"{label}.stl")
+    found = read_source(place, TEMPLATES, SourceOptions("mm"))
+    assert found.name == name
+    text = planned_product(found, tuple(label for label, _ in found.units())).files[f"{name}.pag"]
+    assert text.decode().startswith(f"// {name}: 5 parts, planned\nroot = {name};\n")
+
+
+def test_turned_copies_have_clean_rotations(tmp_path: Path) -> None:
+    """As STL has 32 bits, motions between copies are off by 1e-8."""
+    body = wedge()
+    for n, angle in enumerate((0, 90, 180)):
+        turned = body.copy()
+        turn = trimesh.transformations.rotation_matrix(np.radians(angle), (0, 0, 1))
+        turned.apply_transform(trimesh.transformations.translation_matrix((20 * n, 0, 0)) @ turn)
+        turned.export(tmp_path / f"arm{n}.stl")
+    block((-9, -9, -5), (60, 9, 0)).export(tmp_path / "base.stl")
+    found = read_source(tmp_path, TEMPLATES, SourceOptions("mm"))
+    (text,) = [
+        text.decode()
+        for name, text in planned_product(found, ("base", "arm0", "arm1", "arm2")).files.items()
+        if name.endswith(".pag")
+    ]
+    assert "quat" not in text
+    assert text.count("turn = ( 0, 0, 90 )") == text.count("turn = ( 0, 0, 180 )") == 1

@@ -116,7 +116,7 @@ def test_no_sub_assembly_tips_where_another_order_stands(tmp_path: Path) -> None
     assert isinstance(found, Planned) and found.figures.tips == 0
     made = [{*join.pile, *join.come} for join in found.operations]
     assert not any({"bar"} < units and "floor" not in units for units in made)
-    assert len(found.notes) == 1
+    assert not any("tip" in note for note in found.notes)
     bridge = plan(model_source(tmp_path, {k: v for k, v in parts.items() if k != "floor"}), QUICK)
     assert isinstance(bridge, Planned) and bridge.figures.tips == 1
     assert "a sub-assembly tips over" in bridge.notes[1]

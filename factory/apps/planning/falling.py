@@ -1,0 +1,63 @@
+"""What of a tree's sub-assemblies stays together by itself, and what needs a hand or glue."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from factory.apps.planning.blocking import Blocking
+from factory.apps.planning.cannot import Units
+from factory.apps.planning.exact import Tree
+from factory.apps.planning.writing import Screwed
+
+
+def sub_assemblies(tree: Tree) -> Iterator[tuple[Units, Units, bool]]:
+    """The operations of a tree, inputs first: the units of the pile, those that come, and whether
+    the pile stays with its robot."""
+    yield from _below(tree, [])
+
+
+def _below(tree: Tree, units: list[int]) -> Iterator[tuple[Units, Units, bool]]:
+    """The operations of a tree, whose units are added to a list."""
+    if isinstance(tree, int):
+        units.append(tree)
+        return
+    screwed = isinstance(tree, Screwed)
+    pile = list[int]()
+    below = (tree.tree, *tree.screws) if isinstance(tree, Screwed) else tree
+    for number, one in enumerate(below):
+        come = list[int]()
+        yield from _below(one, come)
+        if number:
+            yield tuple(pile), tuple(come), number > 1 and not screwed
+        pile += come
+    units += pile
+
+
+def units_in(tree: Tree) -> Units:
+    """The units of a tree: its base first, then in the order in which they come."""
+    units = list[int]()
+    for _ in _below(tree, units):
+        pass
+    return tuple(units)
+
+
+def held_by(graphs: Blocking, screws: Sequence[int]) -> Blocking:
+    """The same graphs, with all that is near a screw held by it."""
+    if not len(graphs.rests):
+        return graphs
+    rests = graphs.rests.copy()
+    rests[list(screws)] |= graphs.near[list(screws)]
+    rests[:, list(screws)] |= graphs.near[:, list(screws)]
+    return replace(graphs, rests=rests)
+
+
+def senseless(graphs: Blocking, tree: Tree) -> tuple[int, int]:
+    """The number of sub-assemblies of which something would fall, the product aside, and of
+    operations that put a part under a pile."""
+    falls = under = 0
+    for pile, come, stays in sub_assemblies(tree):
+        members = (*pile, *come)
+        falls += len(members) < len(graphs) and not graphs.stands(members)
+        under += stays and graphs.puts_under(pile, come)
+    return falls, under

@@ -1,0 +1,152 @@
+"""Plans are what an engineer would do: twenty products with a known order, from STL files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from factory.apps.planning.plan import Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
+from factory.apps.planning.writing import Screwed, Tree, leaves, planned_product
+from factory.floor.geometry.overlap import drawn
+from factory.floor.geometry.product import product_geometry
+from factory.floor.mating.mating import matings
+from factory.pipeline import all_templates
+from factory.theory.compiler.expanding import expand
+from tests.apps.planning.test_plan_audit import LEAST, cuts, ways
+from tests.engineered_products import MADE, Engineered, box, numbered, rod, screw, write_stl
+
+TEMPLATES = all_templates()
+
+QUICK = PlanOptions(lay_out=False)
+
+ENOUGH = 18
+"""Of twenty products so many are planned as an engineer would."""
+
+
+@pytest.fixture(autouse=True)
+def no_decomposition(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ways are the same without CoACD, which takes most of the time."""
+    monkeypatch.setattr("factory.floor.geometry.decomposition.release", lambda package: "")
+
+
+def joins(tree: Tree) -> Iterator[tuple[list[str], list[str]]]:
+    """The operations of a tree: the pile, and what comes."""
+    below = (tree.tree, *tree.screws) if isinstance(tree, Screwed) else tree
+    if isinstance(below, str):
+        return
+    pile = list[str]()
+    for one in below:
+        yield from joins(one)
+        if pile:
+            yield pile, list(leaves(one))
+        pile = [*pile, *leaves(one)]
+
+
+def faults(made: Engineered, found: Planned) -> list[str]:
+    """What an engineer would do otherwise."""
+    base = leaves(found.tree)[0]
+    wrong = [] if base in made.base else [f"{base} is the base"]
+    for first, then in made.pairs():
+        for pile, come in joins(found.tree):
+            if then in pile and first in come:
+                wrong.append(f"{then} is there before {first}")
+    return wrong
+
+
+def planned(made: Engineered, folder: Path, options: PlanOptions) -> Planned:
+    source = read_source(write_stl(made.parts, folder), TEMPLATES, SourceOptions("mm"))
+    found = plan(source, options)
+    assert isinstance(found, Planned)
+    return found
+
+
+@pytest.mark.parametrize("lay_out", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_the_order_is_that_of_an_engineer(lay_out: bool, tmp_path: Path) -> None:
+    assert len(MADE) == 20
+    wrong = {}
+    for make in MADE:
+        made = make()
+        found = planned(made, tmp_path / make.__name__, PlanOptions(lay_out=lay_out))
+        if bad := faults(made, found):
+            wrong[make.__name__] = bad
+    assert len(MADE) - len(wrong) >= ENOUGH, wrong
+
+
+SEEN = ("upright_flange", "keyed_shaft", "clamp")
+"""Products whose ways are always looked at."""
+
+
+@pytest.mark.parametrize(
+    "make",
+    [pytest.param(make, marks=() if make.__name__ in SEEN else pytest.mark.slow) for make in MADE],
+    ids=lambda make: make.__name__,
+)
+def test_nothing_is_cut_on_the_way(make: object, tmp_path: Path) -> None:
+    """The greatest volume that what comes has in common with what stands is that of when it is
+    there: none."""
+    source = read_source(write_stl(make().parts, tmp_path), TEMPLATES, SourceOptions("mm"))  # type: ignore[operator]
+    found = plan(source, QUICK)
+    assert isinstance(found, Planned)
+    made = planned_product(source, found.tree, found.orientation)
+    product = product_geometry(made.pag, made.files)
+    judged = matings(expand(made.pag, TEMPLATES), product)
+    assert len(judged.all) == len(source.parts) - 1 and not judged.of_kind("blocked")
+    bodies = {label: drawn(solid) for label, solid in product.solids.items()}
+    for mating in judged.all:
+        for way in ways(mating):
+            cut, finished = cuts(mating, made.pag, product, bodies, way)
+            assert cut <= finished + LEAST and finished <= LEAST, (mating.label, way)
+
+
+def test_what_falls_is_said_and_counted(tmp_path: Path) -> None:
+    """Pins through the holes of a plate fall until a foot is below them, which comes last if they
+    do not fit through it; in blind holes they stand."""
+    at = [(-20.0, 0.0), (20.0, 0.0)]
+    for low, falls in ((0, 1), (3, 0)):
+        pins = numbered("pin", lambda place, low=low: rod(3, low, 14, place), at)
+        plate = box(60, 40, 10) - rod(3, low, 20, at[0]) - rod(3, low, 20, at[1])
+        found = planned(
+            Engineered({"plate": plate, **pins}, frozenset(), ()), tmp_path / str(low), QUICK
+        )
+        assert leaves(found.tree)[0] == "plate"
+        assert "plate is the base, onto which all others come (--base)" in found.notes
+        assert found.figures.falls == falls
+        told = [note for note in found.notes if "hand or glue" in note]
+        assert told == ["the sub-assembly needs a hand or glue until more is there"] * falls
+
+
+def test_screws_come_from_above_if_the_product_can_stand_so(tmp_path: Path) -> None:
+    at = [(-20.0, -12.0), (20.0, 12.0)]
+    parts = {
+        "block": box(60, 40, 30) - rod(2, 10, 40, at[0]) - rod(2, 10, 40, at[1]),
+        "plate": box(60, 40, 5, (0, 0, 30)) - rod(2.2, 20, 50, at[0]) - rod(2.2, 20, 50, at[1]),
+        **numbered("screw", lambda place: screw(place, 35, 20, 2), at),
+    }
+    turned = {label: body.rotate((0, 90, 0)) for label, body in parts.items()}
+    found = planned(Engineered(turned, frozenset(), ()), tmp_path, QUICK)
+    assert "the product stands with +x of the file up" in found.notes[0]
+    assert all(join.lowered for join in found.operations)
+
+
+def test_a_driver_does_not_reach_a_screw_between_tall_walls(tmp_path: Path) -> None:
+    """It comes before them, although the walls leave room for its head; between low ones last."""
+    parts = {
+        "plate": box(80, 60, 12) - rod(2, 2, 20),
+        "tag": box(20, 20, 3, (0, 0, 12)) - rod(2.2, 0, 30),
+        "screw": screw((0, 0), 15, 12, 2),
+    }
+    for tall, before in ((30, False), (120, True)):
+        well = (
+            box(40, 40, tall, (0, 0, 15))
+            - box(9, 9, 2 * tall, (0, 0, 0))
+            - box(21, 21, 4, (0, 0, 12))
+        )
+        all_ = {**parts, "well": well + box(60, 50, 3, (0, 0, 12)) - box(22, 22, 10, (0, 0, 8))}
+        made = Engineered(
+            all_, frozenset({"plate"}), (("screw", "well"),) if before else (("well", "screw"),)
+        )
+        found = planned(made, tmp_path / str(tall), QUICK)
+        assert not faults(made, found), tall
