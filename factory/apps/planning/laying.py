@@ -37,7 +37,7 @@ from factory.apps.planning.writing import Tree as LabelTree
 from factory.floor.geometry.product import product_geometry
 from factory.theory.lang.pag_reader import read_pag
 
-LAID = 160
+LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""
 
 ALIKE = 0.01

@@ -62,7 +62,7 @@ DECOMPOSING = "decomposing parts into convex bodies"
 LAYING = "laying out"
 """The name of the last stage of planning."""
 
-HELD, AGAIN = 4, 2
+HELD, AGAIN = 3, 1
 """So often trees of a few units are sought again in which what no hand can hold is joined
 otherwise, and so many of these are laid out."""
 
