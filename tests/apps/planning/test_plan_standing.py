@@ -119,7 +119,7 @@ def test_no_sub_assembly_tips_where_another_order_stands(tmp_path: Path) -> None
     assert not any("tip" in note for note in found.notes)
     bridge = plan(model_source(tmp_path, {k: v for k, v in parts.items() if k != "floor"}), QUICK)
     assert isinstance(bridge, Planned) and bridge.figures.tips == 1
-    assert "a sub-assembly tips over" in bridge.notes[1]
+    assert any("a sub-assembly tips over" in note for note in bridge.notes)
 
 
 @pytest.mark.parametrize("base", ["plate", "dowel2"])
