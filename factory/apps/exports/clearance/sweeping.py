@@ -58,10 +58,11 @@ class SweptShapes:
     def near(self, other: SweptShapes, least: float = NEAREST) -> tuple[str, str] | None:
         """The geoms of two machines that are no further apart than the `least` distance [m], in
         height and seen from above: of which that is so of the boxes, and of the hulls of what is
-        in them."""
+        in them. Where there are several, those whose boxes are nearest."""
         a, b = self.boxes, other.boxes
         apart = np.maximum(a[:, None, 0] - b[None, :, 1], b[None, :, 0] - a[:, None, 1]).max(axis=2)
-        for i, j in np.argwhere(apart <= least).tolist():
+        pairs = np.argwhere(apart <= least)
+        for i, j in pairs[np.argsort(apart[apart <= least], kind="stable")].tolist():
             one, its = (MultiPoint(plan).convex_hull for plan in (self.plans[i], other.plans[j]))
             if one.distance(its) <= least:
                 return self.geoms[i], other.geoms[j]
