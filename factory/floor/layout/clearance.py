@@ -34,9 +34,10 @@ def certify(layout: Layout) -> Certificate:
     factory, by_label = layout.factory, piles(layout.factory, layout.product)
     swept, apart = regions(layout, by_label), Exclusions()
     faults = [*islice(embedding_faults(layout), MOST)]
+    if not faults:  # what the net says nothing about comes first: it is found at once
+        faults += islice(chain(meeting_faults(layout, by_label), collisions(layout)), MOST)
     if not faults:
         apart = exclusions(layout)
-        faults += islice(chain(meeting_faults(layout, by_label), collisions(layout)), MOST)
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
