@@ -115,7 +115,7 @@ def test_an_overview_is_from_where_the_shed_is_not_in_front(action) -> None:
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
 def test_the_frame_is_filled_one_way(replica, action, framing) -> None:
     view = overview(action, framing)
-    filled = np.ptp(seen(view, action.points), axis=0) / 2
+    filled = np.ptp(seen(view, action.framed), axis=0) / 2
     assert filled.max() > 0.85
 
 
