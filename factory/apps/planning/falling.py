@@ -8,38 +8,22 @@ from dataclasses import replace
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Units
 from factory.apps.planning.exact import Tree
-from factory.apps.planning.writing import Screwed
+from factory.apps.planning.writing import Screwed, leaves
 
 
 def sub_assemblies(tree: Tree) -> Iterator[tuple[Units, Units, bool]]:
     """The operations of a tree, inputs first: the units of the pile, those that come, and whether
     the pile stays with its robot."""
-    yield from _below(tree, [])
-
-
-def _below(tree: Tree, units: list[int]) -> Iterator[tuple[Units, Units, bool]]:
-    """The operations of a tree, whose units are added to a list."""
     if isinstance(tree, int):
-        units.append(tree)
         return
     screwed = isinstance(tree, Screwed)
-    pile = list[int]()
-    below = (tree.tree, *tree.screws) if isinstance(tree, Screwed) else tree
-    for number, one in enumerate(below):
-        come = list[int]()
-        yield from _below(one, come)
+    pile: Units = ()
+    for number, one in enumerate((tree.tree, *tree.screws) if screwed else tree):
+        yield from sub_assemblies(one)
+        come: Units = leaves(one)
         if number:
-            yield tuple(pile), tuple(come), number > 1 and not screwed
+            yield pile, come, number > 1 and not screwed
         pile += come
-    units += pile
-
-
-def units_in(tree: Tree) -> Units:
-    """The units of a tree: its base first, then in the order in which they come."""
-    units = list[int]()
-    for _ in _below(tree, units):
-        pass
-    return tuple(units)
 
 
 def held_by(graphs: Blocking, screws: Sequence[int]) -> Blocking:

@@ -16,7 +16,7 @@ from factory.apps.planning.bases import EQUAL, likely, worth
 from factory.apps.planning.blocking import NO_RELATION, Blocking, Unheld
 from factory.apps.planning.drivers import Drivers
 from factory.apps.planning.exact import Expected
-from factory.apps.planning.falling import held_by, senseless, units_in
+from factory.apps.planning.falling import held_by, senseless
 from factory.apps.planning.fastening import fastened, renumbered
 from factory.apps.planning.judging import Judged
 from factory.apps.planning.parts import InPlace
@@ -24,7 +24,7 @@ from factory.apps.planning.searching import Aim, Sought, Trees, least, trees
 from factory.apps.planning.subsets import BLOCKED, MOST, ROOT_AXIS, Stance
 from factory.apps.planning.threads import threads
 from factory.apps.planning.turning import only
-from factory.apps.planning.writing import planned_product
+from factory.apps.planning.writing import leaves, planned_product
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.theory.compiler.expanding import expand
@@ -71,7 +71,7 @@ class Seeking:
         turns = zip_longest(onto_base.all, others.all)
         for judged in (judged for pair in turns for judged in pair if judged is not None):
             falls, under = senseless(firm, judged.tree)
-            odd = based.base >= 0 and based.base != units_in(judged.tree)[0]
+            odd = based.base >= 0 and based.base != leaves(judged.tree)[0]
             sense = replace(judged, falls=falls, under=under + odd)
             seen.setdefault((judged.tree, judged.stance), sense)
         return Trees(tuple(seen.values()), onto_base.optimal and others.optimal)

@@ -22,7 +22,7 @@ from factory.floor.mating.mating import matings
 from factory.theory.compiler.expanding import expand
 from factory.theory.problem.pag import AllowedOverlap, most_allowed
 
-Unit = TypeVar("Unit", str, int)
+Unit = TypeVar("Unit", bound=str | int)
 
 Tree = Union[str, tuple["Tree", ...], "Screwed[str]"]
 """The label of a part or of a sub-tree that is kept, or what is mated: two trees or more, of which
@@ -156,13 +156,13 @@ def _meant(
         yield AllowedOverlap(ceil(1e5 * depth) / 1e5, labels)
 
 
-def leaves(tree: Tree) -> tuple[str, ...]:
+def leaves(tree: Unit | tuple[Any, ...] | Screwed[Unit]) -> tuple[Unit, ...]:
     """The units of a tree: its base first, then in the order in which they come."""
-    if isinstance(tree, str):
+    if isinstance(tree, str | int):
         return (tree,)
-    if isinstance(tree, Screwed):
-        return (*leaves(tree.tree), *tree.screws)
-    return tuple(label for below in tree for label in leaves(below))
+    if isinstance(tree, tuple):
+        return tuple(unit for below in tree for unit in leaves(below))
+    return (*leaves(tree.tree), *tree.screws)
 
 
 def _title(titles: Titles, tree: Tree) -> str:
