@@ -109,9 +109,9 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
     """Length of a robot's move in an operation, by both [m]."""
-    paths = layout.guidepaths
+    axes = layout.factory.axes
     return {
-        (number, robot): abs(visit.at - before.at) * paths[robot].lever
+        (number, robot): abs(visit.at - before.at) * axes[robot].motion.lever
         for (number, robot), (before, visit) in layout.ways.items()
     }
 

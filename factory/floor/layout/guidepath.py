@@ -16,7 +16,6 @@ import numpy as np
 
 from factory.floor.layout.way import Bend, way_of
 from factory.support.arrays import Array
-from factory.theory.problem.robot_bodies import MOTIONS, TURN_JOINT
 
 Box = tuple[float, float, float, float]
 """(xlo, xhi, ylo, yhi) [m]."""
@@ -88,11 +87,6 @@ class Guidepath:
     def travels(self) -> bool:
         """Whether the robot goes along it; else it stands at its station, and turns."""
         return self.turn is None
-
-    @property
-    def lever(self) -> float:
-        """Distance [m] that the robot goes for a unit of x: 1, but where x is an angle."""
-        return 1.0 if self.travels else MOTIONS[TURN_JOINT].lever
 
     @property
     def length(self) -> float:
