@@ -63,8 +63,8 @@ class _Writer:
             joints = [names.joint(axis) for axis in axes]
             if one.bodies.bent is not None:
                 joints[:1] = [joint for joint, _ in names.moved_along(robot)]
-            # from the carriage up: what goes up is above what travels, and below what turns
-            bodies = [*dict.fromkeys([names.carriage(robot), *map(names.moved, axes[::-1])])]
+            chain = map(names.moved, factory.chain(one.robot))
+            bodies = [*dict.fromkeys([names.carriage(robot), *chain])]
             scales = [self._scales[joint] for joint in joints]
             return _way(one, bodies, joints, [names.grip(robot, label) for label in held], scales)
         if name == "tray":

@@ -27,7 +27,7 @@ def add_welds(
     """Grips, feeders, parking places, and the star that holds a finished product together."""
     factory = layout.factory
     for grip in grips_of(layout, bodies):
-        axis = factory.outermost(grip.robot)
+        axis = factory.chain(grip.robot)[-1]
         name, body = names.grip(axis.robot.name, grip.label), names.part(grip.label, 1)
         turn = seen_from(layout.guidepaths[grip.robot], grip.fed)
         _weld(equality, name, names.moved(axis), body, (*grip.position, *turn))

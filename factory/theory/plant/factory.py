@@ -25,7 +25,7 @@ from factory.theory.problem.ids import (
 )
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import Plan, out_of_turn
-from factory.theory.problem.robot_bodies import LIFT_JOINT, MOTIONS
+from factory.theory.problem.robot_bodies import LIFT_JOINT
 
 NO_PARENT = OperationId(-1)
 """The operation that takes what a dropoff makes: none."""
@@ -221,22 +221,21 @@ class Factory(Pictured):
         return self._lowered.get(robot, 0.0)
 
     def axes_of(self, robot: int) -> list[AxisId]:
-        """The axes of a robot (index)."""
+        """The axes of a robot (index), its first one first."""
         return [AxisId(robot), *([self._up[robot]] if robot in self._up else [])]
 
-    def outermost(self, robot: int) -> Axis:
-        """The axis of a robot (index) whose body holds what it brings: the last of the joints from
-        its carriage up that it uses."""
-        joints = [*MOTIONS]
-        return max(
+    def chain(self, robot: int) -> list[Axis]:
+        """The axes of a robot (index) from its carriage up: each moves all after it, and the body
+        of the last one holds what the robot brings."""
+        joints = self.robots[robot].body.axes
+        return sorted(
             (self.axes[axis] for axis in self.axes_of(robot)),
-            key=lambda axis: joints.index(axis.joint.joint),
+            key=lambda axis: joints.index(axis.joint),
         )
 
     def robot_of(self, axis: int) -> RobotId:
         """The robot (index) of an axis."""
-        count = len(self.robots)
-        return RobotId(axis) if axis < count else RobotId([*self._lowered][axis - count])
+        return self.axes[axis].robot.index
 
     def lowers(self, robot: int) -> bool:
         """Whether a robot (index) lowers what it delivers."""
