@@ -45,15 +45,9 @@ class BentWays:
     def of(cls, m: Any, called: list[str], bent: Bent) -> BentWays:
         """Those of robots `called` in a model. Raises KeyError where it lacks them."""
         robots, ways = bent
-        named = [called[robot] for robot in robots]
-        pairs = [
-            [m.joint(name).id for name in (names.slide(r), names.slide_across(r))] for r in named
-        ]
-        joints = np.array(pairs, np.intp).reshape(-1, 2)
-        acts = [
-            [m.actuator(name).id for name in (names.drive(r), names.drive_across(r))] for r in named
-        ]
-        drives = np.array(acts, np.intp).reshape(-1, 2)
+        moved = [pair for robot in robots for pair in names.moved_along(called[robot])]
+        joints = np.array([m.joint(joint).id for joint, _ in moved], np.intp).reshape(-1, 2)
+        drives = np.array([m.actuator(drive).id for _, drive in moved], np.intp).reshape(-1, 2)
         return cls(
             np.array(robots, np.intp),
             ways,
@@ -64,8 +58,7 @@ class BentWays:
 
     def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Their arc lengths [m] and speeds [m/s]."""
-        x, first = self.ways.nearest(qpos[self.slides])
-        return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
+        return self.ways.along(qpos[self.slides], qvel[self.dofs])
 
     def reached(self, ctrl: Array) -> Array:
         """The arc lengths [m] of their setpoints."""

@@ -117,6 +117,12 @@ class Ways:
         best = np.arange(len(places)), np.einsum("npj,npj->np", left, left).argmin(axis=1)
         return self.middle[best] + off[best], first[best] + off[best][:, None] * second[best]
 
+    def along(self, places: Array, velocities: Array) -> tuple[Array, Array]:
+        """The coordinates (n,) of the points that are nearest to places (n, d), and the speeds (n,)
+        along the ways of velocities (n, d)."""
+        x, first = self.nearest(places)
+        return x, (velocities * first).sum(axis=-1) / (first**2).sum(axis=-1)
+
     def pieces(self, row: int, low: float, high: float) -> Iterator[Array]:
         """A way between two coordinates [m] piece by piece: the two ends of a straight one, the
         three control points of half a corner. Each lies in the hull of its points (k, 2)."""

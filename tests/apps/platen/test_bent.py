@@ -15,6 +15,7 @@ from factory.apps.fidelity.measuring import Measurement
 from factory.apps.monitor import beside
 from factory.engine.mjcf.loading import load
 from factory.engine.simulation.modelling import physical_model
+from factory.engine.simulation.mujoco.curves import Curves
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.bending import Detour, bent
@@ -23,7 +24,7 @@ from factory.floor.layout.dimensions import up
 from factory.floor.layout.embedding import certified
 from factory.floor.layout.feeding import cleared
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.way import Bend, Ways, rounding_for, way_of
+from factory.floor.layout.way import FAR, Bend, Ways, rounding_for, way_of
 from factory.support.errors import RunError
 from factory.support.settings import Settings
 from tests.examples import without_hands
@@ -70,6 +71,30 @@ def test_the_nearest_point_of_a_place_on_a_way_is_that_place() -> None:
         place, first, _ = WAYS.at(np.arange(3), at)
         for found, known in zip(WAYS.nearest(place), (at, first), strict=True):
             assert np.abs(found - known).max() < 1e-12
+
+
+def test_a_curve_moves_as_many_joints_as_it_has_dimensions() -> None:
+    """Axis 1 of four moves joints 1, 4 and 5, and axis 3 moves joints 3, 6 and 7: each along a line
+    in space."""
+    along = np.array([[2.0, -1.0, 2.0], [-6.0, 2.0, 3.0]]) / [[3.0], [7.0]]
+    terms = np.zeros((2, 1, 3, 3))
+    terms[:, 0, 1] = along
+    ways = Ways(np.array([[-FAR, FAR]] * 2), np.zeros((2, 1)), terms, np.ones(2))
+    index, joints = np.array([1, 3]), np.array([[1, 4, 5], [3, 6, 7]])
+    row = np.array([-1, 0, -1, 1])
+    curves = Curves(index, ways, row, joints, joints, joints[:, 1:])
+    x, v = np.array([0.3, -0.2]), np.array([0.5, 0.7])
+    askew = np.cross(along, [0.0, 0.0, 0.1])  # beside the lines: not seen
+    for found, known in zip(
+        curves.along(along * x[:, None] + askew, along * v[:, None] - askew), (x, v), strict=True
+    ):
+        assert found == pytest.approx(known)
+    spread = curves.spread(np.zeros(4), np.array([[1.0, 2.0, 3.0, 4.0]]))[0]
+    assert spread[[0, 2]].tolist() == [1.0, 3.0]
+    assert spread[joints] == pytest.approx(along * [[2.0], [4.0]])
+    which, rows = curves.among(np.array([3, 0, 1]))
+    assert which.tolist() == [0, 2]
+    assert curves.further(rows).tolist() == [2, 3, 0, 1]
 
 
 def test_a_way_lies_in_its_pieces() -> None:
