@@ -236,8 +236,10 @@ class Project:
         if not plan.turns or plan.lifts is not None:
             return factory
         from factory.floor.layout.hands.adjusting import lifts_for
+        from factory.theory.compiler.tees import on_stems
 
-        plan = replace(plan, lifts=lifts_for(self._unlifted, self.catalogue))
+        lifts, (_, place) = lifts_for(self._unlifted, self.catalogue), on_stems(factory)
+        plan = replace(plan, lifts=frozenset(r for r, at in enumerate(place) if at in lifts))
         return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
 
     @cached_property

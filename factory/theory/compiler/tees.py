@@ -60,4 +60,5 @@ def on_stems(factory: Factory) -> tuple[Factory, tuple[int, ...]]:
     ]
     turns = tuple(tuple(place[robot] for robot in turn) for turn in factory.plan.turns)
     plan = replace(factory.plan, turns=turns, names=(), tees=())
-    return replace(assigned(factory, robots, [place]), plan=plan), place
+    adjusted = frozenset(place[robot] for robot in factory.adjusted)
+    return replace(assigned(factory, robots, [place]), plan=plan, adjusted=adjusted), place
