@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import radians
+from math import radians, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +18,10 @@ from factory.engine.record.state import State
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.timing import Timing
 from factory.floor.geometry.solids import rotation
 from factory.floor.geometry.turning import axis_of, presented, turning_box, turning_pieces
+from factory.floor.layout.durations import Pace, operation_times
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout, carriers, delivery
 from factory.floor.layout.request import Ground
@@ -223,6 +225,19 @@ def test_two_manipulators_serve_one_robot(tmp_path: Path) -> None:
     run = Simulation(layout, RunRequest(units=6)).run()
     assert_good(run)
     assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.02)
+
+
+def test_layouts_are_searched_with_the_time_that_a_turn_takes(tmp_path: Path) -> None:
+    """By the bounds of other operations: the ticks, and where a robot brakes in the goal ball."""
+    layout, chosen = read(written(tmp_path, TWO)).layout, Settings()
+    timing, robots = Timing(layout, chosen), layout.factory.robots
+    estimates = operation_times(layout, Pace.of(chosen))
+    soonest = -timing.tick - sqrt(2 * chosen.eps / chosen.acceleration)
+    turning = [o for o in layout.factory.operations if not all(robots[r].travels for r in o.robots)]
+    assert len(turning) == 4
+    for operation in turning:
+        later = timing.delays[operation.index] - estimates[operation.index]
+        assert soonest < later < 2 * timing.tick, operation.label
 
 
 def test_what_is_joined_before_can_be_placed(tmp_path: Path) -> None:

@@ -26,6 +26,7 @@ from factory.film.spotlight import DIM, DIMMER, Spotlight
 from factory.film.tour import BETWEEN, OPENING, STAYS, Tour
 from factory.film.vantage import hidden, overview
 from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.theory.problem.pag import NOPART
 from tests.examples import without_hands
@@ -291,6 +292,14 @@ def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
 # --- a tour ---------------------------------------------------------------------------------------
 
 
+def carriage_at(log: Log, take: Take, robot: str, time: float) -> Array:
+    """Where a robot's carriage is at a time of a log (3,) [m]."""
+    d = mujoco.MjData(take.m)
+    d.qpos[:] = moment_of(log, log.row_at(time)).shown.qpos
+    mujoco.mj_kinematics(take.m, d)
+    return np.array(d.body(names.carriage(robot)).xpos)
+
+
 def test_a_tour_cuts_at_events(log, take) -> None:
     """From the overview to a hand-over that has started, when its carrier is there, back a moment
     after its end or when the carrier goes on, and in the end to the delivery of the last
@@ -298,11 +307,13 @@ def test_a_tour_cuts_at_events(log, take) -> None:
     factory, history = take.subject.factory, History(take.subject)
     history.catch_up(log.timed_entries, float("inf"))
     tour = Tour(Replica(take.m), WIDE, history, 2)
+    close = list[View]()
     cuts, last = list[tuple[float, frozenset[str] | None]](), None
     for time in np.arange(0.0, float(log.time[-1]), 1 / 30):
         shown = moment_of(log, log.row_at(float(time))).shown
-        tour.view(shown, 1 / 30, float(time))
+        view = tour.view(shown, 1 / 30, float(time))
         if tour.near and not tour.last:
+            close.append(view)
             assert tour.near.is_there(take.m, shown.qpos)
         if tour.concerned != last:
             cuts.append((float(time), tour.concerned))
@@ -314,6 +325,11 @@ def test_a_tour_cuts_at_events(log, take) -> None:
     when, taking = next((t, o) for t, o in reversed(of) if t < first)
     done = next(t for t, label in ends if label == taking.label and t > when)
     assert len(taking.inputs) > 1 and when < first < done
+    carrier = factory.robots[taking.robots[taking.template.carrier - 1]]
+    foot = [carriage_at(log, take, carrier.name, t) for t in np.arange(first, back, 1 / 30)]
+    there = carriage_at(log, take, carrier.name, done)
+    away = np.abs(seen(close[0], np.array(foot)) - seen(close[0], there[None]))
+    assert away.max() < 0.4, "its carrier is where it works, in halves of the picture"
     assert nobody is None and 0 < back - done <= STAYS + 1 / 30 + 1e-6
     assert first >= OPENING
     others = [time for time, concerned in cuts[1:-1] if concerned]
