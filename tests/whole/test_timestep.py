@@ -28,6 +28,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
+from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.resources import mjcf_folder
 from factory.support.settings import AUTO, TICK, Settings
@@ -40,6 +41,9 @@ from tests.paths import PAPER
 from tests.simulation_values import layout_of
 
 layout = cache(layout_of)
+
+SHORTEST_OF_LAMP = 0.04
+"""Length of the holder, the shortest part of examples/lamp.pag [m]."""
 
 LIMITS = ("tracking_error_max_mm", "handoff_gap_max_mm", "weld_residual_max_mm")
 """The figures that a timestep is chosen by."""
@@ -199,9 +203,9 @@ def test_it_is_the_longest_that_is_good(
 
     def good(one: Settings) -> bool:
         fastest = max(speed * (1 + jitter), settings.outfeed)
-        return fastest * one.step < clearance and timestep._good(
-            one, tuple(timestep._axes(settings, floor, jitter))
-        )
+        still = timestep._impact(one, SHORTEST_OF_LAMP) < timestep.TURNED
+        axes = tuple(timestep._axes(settings, floor, jitter))
+        return fastest * one.step < clearance and still and timestep._good(one, axes)
 
     longer = [
         replace(made, timestep=TICK / n, substeps=n)
@@ -282,9 +286,31 @@ def test_a_prediction_that_promises_too_much_is_noticed(monkeypatch: pytest.Monk
     monkeypatch.setattr(driving, "SURE", 0.2)
     monkeypatch.setattr(driving, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
     monkeypatch.setattr(timestep, "DEEPEST", inf)  # nor what hangs from feeders
+    monkeypatch.setattr(timestep, "IMPACT", 0.0)  # nor parts that meet
     found = outcomes(touching=True)  # a shutter that overshoots so far meets the belt
     assert sum(most > error for _, error, most in found) > len(found) / 3
     assert max(most for *_, most in found) > 1e3 * ALLOWED
+
+
+TINY = """root = s3;
+s1 = mate ( p1, p0 );  s1t = press ( s1, dwell = 0.016 );  s3 = mate ( p2, s1t );
+p0 = atomic ( box = ( 0.0008, 0.0048, 0.0016 ), pos = ( 0, 0, 0.0008 ) );
+p1 = atomic ( box = ( 0.0024, 0.0080, 0.0016 ), pos = ( 0.00072, -0.0064, 0.0008 ) );
+p2 = atomic ( box = ( 0.0048, 0.0016, 0.0024 ), pos = ( 0.00192, -0.00424, 0.00284 ) );
+"""
+
+
+def test_parts_of_millimetres_that_meet_are_not_turned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the mate, beside their middles; with the timestep of large parts the run fails by that."""
+    file = tmp_path / "tiny.pag"
+    file.write_text(TINY)
+    run = Simulation(read(file).layout, RunRequest(units=2)).run()
+    assert run.verdict.succeeded and run.physics.handoff_angle_max_deg < 0.01
+    monkeypatch.setattr(timestep, "IMPACT", 0.0)
+    run = Simulation(read(file).layout, RunRequest(units=2)).run()
+    assert not run.verdict.succeeded and run.physics.handoff_angle_max_deg > 0.1
 
 
 # --- from outside ---------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from math import radians
 
 from factory.engine.mjcf.driving import (
     ALLOWED,
@@ -37,6 +38,11 @@ DIP, DEEPEST = 1.9e-5, 2.5e-4
 each m/s² of the slider, in timesteps of a tick, measured; and it may be so far: a pad then presses
 on it by half as much as it may."""
 
+IMPACT, LEFT, TURNED = 0.45, 0.53, radians(0.1)
+"""A part that meets another beside its middle is turned by at most IMPACT × a h² over half its
+length; of that a weld leaves the share LEFT in each timestep of the tick until it changes hands,
+turned by at most TURNED [rad] (docs/decisions/timestep.md)."""
+
 CRUISES = 0.7
 """The tray's share of a jump by twice its acceleration: between gaining speed and braking it goes
 at one speed for a while (`layout/outfeed.py`)."""
@@ -47,9 +53,9 @@ def timed(
 ) -> Settings:
     """Settings whose timestep and substeps are numbers: what was asked for, or with AUTO the
     longest timestep in which nothing goes as far as the certified clearance, with which no axis is
-    predicted to get off its reference by more than ALLOWED, all end stops hold, and every robot
-    gets into its goal ball; 2 ms, or the longest below it that the clearance allows, where none
-    does that."""
+    predicted to get off its reference by more than ALLOWED and no part to be turned by more than
+    TURNED, all end stops hold, and every robot gets into its goal ball; 2 ms, or the longest below
+    it that the clearance allows, where none does that."""
     if settings.timestep != AUTO:
         return replace(settings, substeps=settings.steps)
     least = settings.substeps or 1
@@ -59,13 +65,14 @@ def timed(
         return _usual(candidates)
     fastest = max(settings.speed * (1 + jitter), settings.outfeed)
     candidates = [s for s in candidates if fastest * s.step < layout.clearance] or candidates[-1:]
-    axes, heaviest_fed = tuple(dict.fromkeys(_axes(settings, layout, jitter))), 0.0
+    axes = tuple(dict.fromkeys(_axes(settings, layout, jitter)))
     unusual = [axis for axis in axes if not axis.usual]
     candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]
-    if any(layout.hands):
-        heaviest_fed = max(layout.product.solids[o.label].mass for o in layout.factory.leaves)
-    good = (s for s in candidates if _good(s, axes) and _dip(s, heaviest_fed) < DEEPEST)
-    return next(good, _usual(candidates))
+    solids = [layout.product.solids[o.label] for o in layout.factory.leaves]
+    fed = max(solid.mass for solid in solids) if any(layout.hands) else 0.0
+    shortest = min(float(max(solid.high - solid.low)) for solid in solids)
+    calm = (s for s in candidates if _dip(s, fed) < DEEPEST and _impact(s, shortest) < TURNED)
+    return next((s for s in calm if _good(s, axes)), _usual(candidates))
 
 
 def _usual(candidates: Sequence[Settings]) -> Settings:
@@ -88,6 +95,12 @@ def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
 def _dip(settings: Settings, load: float) -> float:
     """How far a part is below where its feeder is to bring it, as a hand comes there [m]."""
     return DIP * load * settings.feeder_limits[1] * (settings.step / TICK) ** 3
+
+
+def _impact(settings: Settings, length: float) -> float:
+    """How far a part of a length is turned [rad] where it changes hands after it met another."""
+    turned = IMPACT * settings.acceleration * settings.step**2 / (length / 2)
+    return turned * float(LEFT ** (TICK / settings.step))
 
 
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:

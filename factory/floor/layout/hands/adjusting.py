@@ -11,8 +11,8 @@ from factory.theory.problem.robot_types import LIFT, Catalogue
 
 
 def lifts_for(hands: Hands, catalogue: Catalogue) -> frozenset[int]:
-    """The robots (index, on stems) of `hands` with several tours and no lift for which one hand
-    suits all labels with a lift, and none without."""
+    """The robots (index) of the factory of `hands` with several tours and no lift for which one
+    hand suits all labels with a lift, and none without."""
     factory, product, push = hands.factory, hands.holding.product, hands.holding.push
     lacking = {
         robot.index
