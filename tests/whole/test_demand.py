@@ -23,12 +23,15 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.simulation.supervisor import Supervisor
+from factory.engine.timing.on_demand import WordTimes
+from factory.engine.timing.timed import timed
 from factory.floor.layout import resting
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import STILL
 from factory.floor.layout.resting import on_demand
 from factory.pipeline import Project, all_templates, read
 from factory.support.errors import InputError
+from factory.support.settings import Settings
 from factory.theory.compiler.mixing import even
 from factory.theory.lang.pag_reader import read_pag
 from factory.theory.nets.threaded import Threads
@@ -197,6 +200,21 @@ def test_a_robot_goes_ahead_of_what_is_skipped() -> None:
 def test_the_cycle_time_of_a_word_is_predicted(wip: int | None) -> None:
     run = simulated("aababbbbaababbab", wip=wip).run()
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+
+
+@pytest.mark.parametrize("stage", [False, True])
+def test_each_unit_leaves_when_it_is_predicted_to(stage: bool) -> None:
+    """From the empty factory, and after units that are skipped: within two ticks."""
+    settings = Settings(stage=stage)
+    family = read("examples/family.pag", (), settings)
+    wanted = ["truck", "truck", "van", "van", "truck", "van"]
+    request = RunRequest(units=len(wanted), demand=ordered(wanted), settings=settings)
+    simulation = Simulation(family.layout, request)
+    timing = simulation.timing
+    foretold = WordTimes(timed(timing), simulation.word).dropoffs
+    run = simulation.run()
+    late = [left - timing.leaving - date for left, date in zip(run.dropoffs, foretold, strict=True)]
+    assert max(map(abs, late)) < 2.01 * timing.tick, late
 
 
 def test_orders_may_come_late() -> None:

@@ -46,11 +46,13 @@ class WordTimes:
     def dropoffs(self) -> list[float]:
         """When each unit is dropped off [s]."""
         factory, net, word = self.timed.timing.factory, self.timed.net, self.word
+        begun, ready = self._beginning
         served = self.timed.timing.coordinated.served.values()
         first = {o.start for o in factory.leaves} | {net.right[one.top] for one in served}
         ends = {o.end for o in factory.dropoffs}
         order = sorted(token_free(net).order, key=self._turns.__getitem__)
         dates, left = dict[tuple[int, int], float](), list[float]()
+        lasting, last = self._lasting, dict[str, float]()
         units = factory.period
         for period in range(1 + max(word.units, default=-1) // factory.period):
             for event in order:
@@ -58,13 +60,18 @@ class WordTimes:
                 for place in net.net.preset[event]:
                     before = net.left[place], period - net.tokens[place]
                     if before in dates:
-                        seconds = self.timed.seconds[place] if self._takes(place, before) else 0.0
+                        times = self.timed.seconds if period else begun
+                        seconds = times[place] if self._takes(before) else 0.0
                         date = max(date, dates[before] + seconds)
+                    elif word.is_made(unit):
+                        date = max(date, ready.get(place, 0.0))
                 number = word.number(unit)
                 if event in first and word.is_made(unit):
                     date = max(date, word.placed(number))
                     if number >= self._wip:
                         date = max(date, left[number - self._wip])
+                if machine := lasting.get(event):
+                    date = last[machine] = date if word.is_made(unit) else last.get(machine, 0.0)
                 dates[event, period] = date
                 if event in ends and word.is_made(unit):
                     left.append(date)
@@ -87,8 +94,30 @@ class WordTimes:
         last = self.dropoffs[len(self.dropoffs) // 2 - 1 :] if len(self.dropoffs) > 1 else [0.0]
         return CycleTime((last[-1] - last[0]) / max(1, len(last) - 1), self.bottleneck)
 
-    def _takes(self, place: int, before: tuple[int, int]) -> bool:
-        """Whether a token stays in a place that a transition, in some period, has put it into."""
+    @cached_property
+    def _beginning(self) -> tuple[list[float], dict[int, float]]:
+        """The time in each place in the first period, and by place when the token is there that it
+        has at the beginning [s]: robots stand at their B ends then."""
+        timing, ways, seconds = self.timed.timing, self.timed.ways, [*self.timed.seconds]
+        for number, taken in timing.first.items():
+            seconds[timing.factory.operations[number].place] = taken
+        return seconds, {ways[key]: s for key, s in timing.first_ways.items() if key in ways}
+
+    @cached_property
+    def _lasting(self) -> dict[int, str]:
+        """The machine whose carriage or slider has come past a point, by that transition. In a unit
+        that is not made it is still where the one before left it."""
+        coordinated, net = self.timed.timing.coordinated, self.timed.net
+        lasting: dict[int, str] = {
+            net.right[p]: f"axis {past.axis}" for past, (p, _) in coordinated.passes.items()
+        }
+        for number, one in coordinated.served.items():
+            carrier = self.timed.timing.factory.operations[number].carrier
+            lasting |= {net.right[one.up]: f"up {carrier}", net.right[one.top]: f"down {carrier}"}
+        return lasting
+
+    def _takes(self, before: tuple[int, int]) -> bool:
+        """Whether a token stays where a transition, in some period, has put it."""
         event, period = before
         return self.word.is_made(period * len(self.word.sequence) + self._turns[event])
 
