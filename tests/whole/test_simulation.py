@@ -19,12 +19,13 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.timed import timed
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.layout import Layout
-from factory.pipeline import all_templates
+from factory.pipeline import all_templates, read
 from factory.support.settings import Settings
 from factory.theory.nets.replay import replay
 from tests.good_runs import assert_good, random_marking
 from tests.layout_values import Drawn, random_layout
 from tests.pag_texts import LONE, PAPER, PRODUCTS, laid_out
+from tests.random_products import random_product
 from tests.simulation_values import ready
 
 
@@ -171,9 +172,9 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
     link = linked(paper).processes[2].link
     assert len(link.state()[0]) == 3
     assert link.waits(4, "part1") is link.waits(5, "part2") is link.has_left(5) is False
-    for read in (lambda: link.has_left(3), lambda: link.waits(0, "nopart")):
+    for ask in (lambda: link.has_left(3), lambda: link.waits(0, "nopart")):
         with pytest.raises(AssertionError, match=r"robot 2 reads robot \d, which is not in the"):
-            read()
+            ask()
     link.at(label["sub2"], 0)
     assert not link.has_left(3)
     with pytest.raises(AssertionError, match="robot 2 reads robot 4, which is not in the mode of"):
@@ -430,3 +431,14 @@ def test_busy_times_are_those_of_operations_that_have_ended() -> None:
     busy = busy_times(plan, [Event(*event) for event in fired])
     assert {robot for robot, spent in enumerate(busy) if spent == 2.75} == {*sub1.robots}
     assert sum(busy) == 2.75 * len(sub1.robots)
+
+
+def test_a_pace_that_is_settling_is_not_the_cycle_time(tmp_path: Path) -> None:
+    """Where robots before the bottleneck fill first, by the timed net too."""
+    file = tmp_path / "product.pag"
+    file.write_text(random_product(291300098))
+    layout = read(file).layout
+    run = Simulation(layout, RunRequest("ideal", 8)).run()
+    assert run.cycle_time_s is None and "not yet steady" in str(run.cycle_time_missing)
+    run = Simulation(layout, RunRequest("ideal", 32)).run()
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.005)

@@ -16,7 +16,6 @@ from hypothesis import strategies as st
 
 from factory.apps.analyze import Timing
 from factory.apps.analyze.analysing import operation_slacks
-from factory.apps.analyze.firing import earliest_firings
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.monitor import beside
 from factory.engine.simulation import simulation as simulations
@@ -39,6 +38,7 @@ from factory.pipeline import read
 from factory.support.settings import Settings
 from factory.theory.control.mode import Mode
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.earliest import earliest_firings
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.problem.pag import NOPART

@@ -1,18 +1,13 @@
-"""Earliest firing dates of the transitions of a timed marked graph (max-plus dates), and the slack
-of its places: the increase of a delay from which a place sets the pace."""
+"""The slack of the places of a timed marked graph: the increase of a delay from which a place sets
+the pace."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from math import inf
-from types import MappingProxyType
 
-import numpy as np
-
-from factory.api import Array, MarkedNet, token_free
-from factory.apps.foreign_nets.behaviour import dead_ends
 from factory.theory.nets.cycle_ratio import CycleRatio
 
 
@@ -84,50 +79,3 @@ def circuits(ratio: CycleRatio, places: Iterable[int]) -> tuple[Slack, ...]:
         if slack.circuit:
             kept.setdefault(frozenset(slack.circuit), slack)
     return tuple(sorted(kept.values(), key=lambda slack: (slack.seconds, min(slack.circuit))))
-
-
-def earliest_firings(
-    net: MarkedNet,
-    seconds: Sequence[float],
-    count: int,
-    first: Mapping[int, float] = MappingProxyType({}),
-    ready: Mapping[int, float] = MappingProxyType({}),
-) -> Array:
-    """(count, T): dates of the first `count` firings of every transition [s].
-
-    The k-th firing takes the k-th token of each place before it: an initial token, available at
-    time 0 or at `ready[p]`, or the token of the producer's firing k - tokens, available
-    `seconds[p]` later; `first[p]` is the delay of the first such token if it differs. Raises
-    ValueError if the net is not a live marked graph."""
-    free = token_free(net)
-    if not net.is_marked_graph or free.stuck or dead_ends(net):
-        raise ValueError("only a live marked graph fires for ever")
-    needs = [
-        (
-            event,
-            [
-                (
-                    net.left[p],
-                    net.tokens[p],
-                    float(seconds[p]),
-                    float(first.get(p, seconds[p])),
-                    float(ready.get(p, 0.0)),
-                )
-                for p in net.net.preset[event]
-            ],
-        )
-        for event in free.order
-    ]
-    dates = [[0.0] * len(net.net.transitions) for _ in range(count)]
-    for k, row in enumerate(dates):
-        for event, places in needs:
-            latest = 0.0
-            for before, tokens, delay, start, begun in places:
-                if k >= tokens:
-                    latest = max(
-                        latest, dates[k - tokens][before] + (start if k == tokens else delay)
-                    )
-                else:
-                    latest = max(latest, begun)
-            row[event] = latest
-    return np.array(dates).reshape(count, len(net.net.transitions))

@@ -10,9 +10,10 @@ from functools import cached_property
 import numpy as np
 
 from factory.api import NONE, Array, MarkedNet, PetriNet, Place, Timing, steady_from
-from factory.apps.analyze.firing import Slack, circuits, earliest_firings
+from factory.apps.analyze.firing import Slack, circuits
 from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
 from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.theory.nets.earliest import earliest_firings
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,6 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         named.append(Circuit(name, seconds[operation.place], 1, circuit, factory.period))
     named += _machines(timing, made)
     whole = PetriNet(made.net.net.transitions, tuple(places))
-    ready = {made.ways[key]: taken for key, taken in timing.first_ways.items() if key in made.ways}
     return TimedNet(
         timing,
         MarkedNet(whole, tuple(tokens)),
@@ -131,7 +131,7 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         made.owners,
         tuple(named),
         timing.first,
-        ready,
+        made.ready,
     )
 
 

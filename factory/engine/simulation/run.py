@@ -97,6 +97,8 @@ class Run:
         word: on demand, the products in the order in which they left.
         failures: what went wrong, in a run that recovers.
         log: the file of its log.
+        settling: whether the timed net, too, has these products leave at another pace than that of
+            the long run: robots before the bottleneck fill first.
     """
 
     world: str
@@ -125,6 +127,7 @@ class Run:
     word: tuple[str, ...] = field(default=(), repr=False)
     failures: Failures | None = None
     log: Path | None = field(default=None, repr=False, compare=False)
+    settling: bool = False
 
     def __repr__(self) -> str:
         made = f"{self.products} of {self.units} products in {self.sim_time_s:.2f} s"
@@ -180,14 +183,16 @@ class Run:
     @property
     def cycle_time_s(self) -> float | None:
         """Mean interval between dropoffs over the whole periods in the last half of the units; None
-        for fewer than `steady_from`."""
-        return mean_interval(self.dropoffs, self.period)
+        for fewer than `steady_from`, and while the pace is settling."""
+        return None if self.settling else mean_interval(self.dropoffs, self.period)
 
     @property
     def cycle_time_missing(self) -> str | None:
         """Why no cycle time is measured; None where one is."""
         if self.cycle_time_s is not None:
             return None
+        if self.settling:
+            return f"{len(self.dropoffs)} products; by the timed net their pace is not yet steady"
         least = steady_from(self.period)
         periods = f", two periods of {self.period}" if least > STEADY else ""
         return f"{len(self.dropoffs)} products; a cycle time is measured from {least} on{periods}"

@@ -17,13 +17,14 @@ from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.modelling import modelled
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import Run, busy_times, entries_of
+from factory.engine.simulation.run import Run, busy_times, entries_of, mean_interval
 from factory.engine.simulation.run_supervisor import RunSupervisor
 from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
 from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.on_demand import cycle_of
 from factory.engine.timing.timed import duration
+from factory.engine.timing.timed import timed as timed_net
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.resting import on_demand, start_at_rest
@@ -42,6 +43,10 @@ if TYPE_CHECKING:
     from factory.engine.mjcf.loading import EngineModel
     from factory.engine.mjcf.model import Model
     from factory.engine.simulation.mujoco.world import MujocoWorld
+
+STEADY, SETTLED = 0.01, 100
+"""Intervals are those of the long run if they differ by less than this share of it; after so many
+products all are."""
 
 PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
@@ -310,7 +315,21 @@ class Simulation:
             period=1 if request.demand else factory.period,
             by_product=self.word.counts(self.before, world.delivered()),
             word=tuple(self.word.products(0, world.delivered())) if request.demand else (),
+            settling=self._is_settling(world.dropoffs),
         )
+
+    def _is_settling(self, left: Sequence[float]) -> bool:
+        """Whether products that `left` at other intervals than those of the long run were to do so
+        by the timed net."""
+        wip, period, pace = self.request.wip, self.layout.factory.period, self.cycle.seconds
+        measured = mean_interval(left, period)
+        if measured is None or self.request.demand or self.supervisor.scans:
+            return False
+        if len(left) > SETTLED or abs(measured / pace - 1) < STEADY:
+            return False
+        net = timed_net(self.timing, wip=wip)
+        foretold = mean_interval(net.departures(len(left)), period)
+        return foretold is not None and abs(foretold / pace - 1) >= STEADY
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
         """Names the order that has not been placed, the robots that are in an operation, or else

@@ -46,7 +46,7 @@ class WordTimes:
     def dropoffs(self) -> list[float]:
         """When each unit is dropped off [s]."""
         factory, net, word = self.timed.timing.factory, self.timed.net, self.word
-        begun, ready = self._beginning
+        begun, ready = self._beginning, self.timed.ready
         served = self.timed.timing.coordinated.served.values()
         first = {o.start for o in factory.leaves} | {net.right[one.top] for one in served}
         ends = {o.end for o in factory.dropoffs}
@@ -95,13 +95,12 @@ class WordTimes:
         return CycleTime((last[-1] - last[0]) / max(1, len(last) - 1), self.bottleneck)
 
     @cached_property
-    def _beginning(self) -> tuple[list[float], dict[int, float]]:
-        """The time in each place in the first period, and by place when the token is there that it
-        has at the beginning [s]: robots stand at their B ends then."""
-        timing, ways, seconds = self.timed.timing, self.timed.ways, [*self.timed.seconds]
+    def _beginning(self) -> list[float]:
+        """The time in each place in the first period [s]: robots stand at their B ends then."""
+        timing, seconds = self.timed.timing, [*self.timed.seconds]
         for number, taken in timing.first.items():
             seconds[timing.factory.operations[number].place] = taken
-        return seconds, {ways[key]: s for key, s in timing.first_ways.items() if key in ways}
+        return seconds
 
     @cached_property
     def _lasting(self) -> dict[int, str]:

@@ -13,6 +13,7 @@ from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.theory.nets.earliest import earliest_firings
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
 from factory.theory.problem.ids import is_end
@@ -80,6 +81,20 @@ class Timed:
         if "magazine" in modes:
             return f"{FEEDER} {modes['magazine']}"
         return self.timing.factory.robots[self.busiest[0]].name
+
+    @cached_property
+    def ready(self) -> Mapping[int, float]:
+        """By place of a way ahead, when the token is there that it has at the beginning [s]."""
+        first = self.timing.first_ways.items()
+        return {self.ways[key]: seconds for key, seconds in first if key in self.ways}
+
+    def departures(self, units: int) -> list[float]:
+        """When each of so many units is dropped off at the earliest, from the initial marking with
+        robots at their B ends [s]."""
+        factory = self.timing.factory
+        periods, ends = -(-units // factory.period), [o.end for o in factory.dropoffs]
+        dates = earliest_firings(self.net, self.seconds, periods, self.timing.first, self.ready)
+        return [float(date) for date in dates[:, ends].ravel()[:units]]
 
     @property
     def cycle(self) -> CycleTime:

@@ -22,7 +22,7 @@ from scipy.sparse import coo_array
 
 from factory.apps.analyze import Change, Timing, analyse
 from factory.apps.analyze.analysing import least_wip
-from factory.apps.analyze.firing import circuits, earliest_firings, slacks
+from factory.apps.analyze.firing import circuits, slacks
 from factory.apps.analyze.timed import flow, reached, timed_net
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
@@ -33,6 +33,7 @@ from factory.floor.modes.modes import robot_limits
 from factory.support.settings import Settings
 from factory.theory.control.mode import Limits
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
+from factory.theory.nets.earliest import earliest_firings
 from factory.theory.nets.marked import MarkedNet
 from tests.command_line import Terminal
 from tests.layout_values import paper_layout, random_layout
