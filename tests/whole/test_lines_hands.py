@@ -32,6 +32,7 @@ from factory.floor.layout.hands.places import places as found_places
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
+from tests.drawn_products import drawn_product
 from tests.layout_values import with_visits
 from tests.random_products import random_product
 
@@ -350,3 +351,11 @@ def test_a_magazine_and_its_robot_are_as_fast_as_predicted(
     file.write_text(random_product(seed))
     run = factory.run(factory.compile(file, robots="least"), units=units)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", [291310082, 291310098])
+def test_a_robot_sets_out_when_its_next_operation_may_start(seed: int, tmp_path: Path) -> None:
+    """Its lift rises first, and is 1 mm below its end then: another robot waits until it is past
+    a point."""
+    run = factory.run(factory.compile(drawn_product(seed).write(tmp_path)), units=16)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, abs=0.01)

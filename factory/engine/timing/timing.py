@@ -145,14 +145,23 @@ class Timing:
             slot = self.factory.operations[number].robots.index(robot)
             way = self._trajectories(number, self.starts[number], change)[slot]
             return way.passes(max(0.0, past.at - visit.at) * factor)
-        rises, length, up = 0, layout.guidepaths[robot].length, self.factory.up(robot)
-        if up is not None and rises_first(layout, robot):
-            low, top = self._rise(up, number)
-            rises = self.axis_drive(up, change).way(top - low).rests(self.settings.eps)
+        length, rises = layout.guidepaths[robot].length, self._rises(past, change)
         home = drive.way((length - visit.at) * factor)
         if past.at < length - HOME:
             return rises + home.passes(min(length - visit.at, length - past.at) * factor)
         return rises + home.rests(HOME) + self._adjusted(robot, number)
+
+    def _rises(self, past: Past, change: Change) -> int:
+        """The ticks until a robot whose lift rises first sets out: when it is up, or past where its
+        next operation may start, which moves it too."""
+        robot, number = self.factory.robot_of(past.axis), operation_of(past.after)
+        up = self.factory.up(robot)
+        if up is None or not rises_first(self.layout, robot):
+            return 0
+        low, top = self._rise(up, number)
+        way, passes = self.axis_drive(up, change).way(top - low), self.coordinated.passes
+        starts = [way.passes(top - p.at) for p in passes if (p.after, p.axis) == (past.after, up)]
+        return min([way.rests(self.settings.eps), *starts])
 
     def _rise(self, axis: AxisId, number: int) -> tuple[float, float]:
         """From where an operation (index) leaves an axis that goes up to where the next one of its
