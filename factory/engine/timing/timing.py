@@ -148,7 +148,7 @@ class Timing:
         length, rises = layout.guidepaths[robot].length, self._rises(past, change)
         home = drive.way((length - visit.at) * factor)
         if past.at < length - HOME:
-            return rises + home.passes(min(length - visit.at, length - past.at) * factor)
+            return rises + home.passes((length - max(visit.at, past.at)) * factor)
         return rises + home.rests(HOME) + self._adjusted(robot, number)
 
     def _rises(self, past: Past, change: Change) -> int:
@@ -158,8 +158,8 @@ class Timing:
         up = self.factory.up(robot)
         if up is None or not rises_first(self.layout, robot):
             return 0
-        low, top = self._rise(up, number)
-        way, passes = self.axis_drive(up, change).way(top - low), self.coordinated.passes
+        (low, top), passes = self._rise(up, number), self.coordinated.passes
+        way = self.axis_drive(up, change).way(top - low)
         starts = [way.passes(top - p.at) for p in passes if (p.after, p.axis) == (past.after, up)]
         return min([way.rests(self.settings.eps), *starts])
 
@@ -179,8 +179,8 @@ class Timing:
         axis = self.factory.up(robot)
         if axis is None or robot not in self.factory.adjusted:
             return 0
-        both = number, self.factory.after(robot, number)
-        one, other = (self.layout.visits[n, robot].up for n in both)
+        after = self.factory.after(robot, number)
+        one, other = (self.layout.visits[n, robot].up for n in (number, after))
         return self.axis_drive(axis, AS_IT_IS).way(abs(one - other)).rests(self.settings.eps)
 
     @cached_property
@@ -296,15 +296,13 @@ class Timing:
         ]
         here = (positions[list(axes)] for axes in self.factory.moves)
         starts = staged([*map(np.where, begins, here, self.left)], self.stages)
-        return MappingProxyType(
-            {n: self._delay(n, start, AS_IT_IS) for n, start in enumerate(starts) if any(begins[n])}
-        )
+        moved = ((n, start) for n, start in enumerate(starts) if any(begins[n]))
+        return MappingProxyType({n: self._delay(n, start, AS_IT_IS) for n, start in moved})
 
     def travel(self, number: int, slot: int) -> float:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
-        axis = self.factory.moves[number][slot]
-        drive = self.axis_drive(axis, AS_IT_IS)
+        drive = self.axis_drive(self.factory.moves[number][slot], AS_IT_IS)
         profile = SpeedProfile(drive.speed, drive.acceleration)
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":
@@ -314,16 +312,12 @@ class Timing:
     @cached_property
     def outfeed(self) -> float:
         """How long the outfeed's tray is away after a dropoff [s]; 0 in the ideal world."""
-        if self.world == "ideal":
-            return 0.0
-        return away(self.layout, self.stepped)
+        return 0.0 if self.world == "ideal" else away(self.layout, self.stepped)
 
     @cached_property
     def leaving(self) -> float:
         """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
-        if self.world == "ideal":
-            return 0.0
-        return leaving(self.layout, self.stepped)
+        return 0.0 if self.world == "ideal" else leaving(self.layout, self.stepped)
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
