@@ -146,6 +146,8 @@ class Blocking:
 
     def can_hold(self, one: Sequence[int], other: Sequence[int]) -> bool:
         """Whether hands may hold both sides of a join: nothing is known that speaks against it."""
+        if not self.unheld:
+            return True
         sides = frozenset(one), frozenset(other)
         return not any(
             (mine == sides[0] and theirs <= sides[1]) or (mine == sides[1] and theirs <= sides[0])

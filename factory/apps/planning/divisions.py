@@ -33,16 +33,18 @@ def never() -> bool:
 @dataclass(frozen=True, slots=True)
 class Batch:
     """Divisions (k,) of subsets of equal size, those of one subset in a row: the subset (`whole`),
-    its side that has the base or else the lowest unit (`one`), and the `levels` (k, 3) of blocking
-    along the first and second horizontal axis, whichever side moves, and along the vertical."""
+    its side that has the base or else the lowest unit (`one`), the `levels` (k, 3) of blocking
+    along the first and second horizontal axis, whichever side moves, and along the vertical, and
+    those `onto` (k, 2) that side from above, and of that side onto the other."""
 
     whole: Masks
     one: Masks
     levels: Levels
+    onto: Levels
 
     def where(self, rows: NDArray[np.bool_] | slice) -> Batch:
         """Some of the divisions."""
-        return Batch(self.whole[rows], self.one[rows], self.levels[rows])
+        return Batch(self.whole[rows], self.one[rows], self.levels[rows], self.onto[rows])
 
     @property
     def other(self) -> Masks:
@@ -148,17 +150,15 @@ def _divided(subsets: Subsets, wholes: Masks, axis: int, up: int, apart: bool) -
         possible &= subsets.hangs[one] & subsets.hangs[whole ^ one]
     whole, one = whole[possible], one[possible]
     one = np.where(subsets.based[whole ^ one], whole ^ one, one)
-    levels = np.stack(
-        [
-            np.minimum(*(subsets.level(along, side, one, whole ^ one) for side in (0, 1)))
-            for along in (*_level(axis), axis)
-        ],
-        axis=-1,
-    )
+    sides = [
+        [subsets.level(along, side, one, whole ^ one) for side in (0, 1)]
+        for along in (*_level(axis), axis)
+    ]
+    levels = np.min(sides, axis=1).T
+    onto = np.transpose(sides[2][::-up])
     based = subsets.based[whole]
-    onto = subsets.level(axis, 0 if up > 0 else 1, (whole ^ one)[based], one[based])
-    levels[based, 2] = onto
-    return Batch(whole, one, levels).where(np.isfinite(LEVEL_PRICES[levels]).any(axis=1))
+    levels[based, 2] = onto[based, 0]
+    return Batch(whole, one, levels, onto).where(np.isfinite(LEVEL_PRICES[levels]).any(axis=1))
 
 
 def splits(wholes: Masks) -> Masks:

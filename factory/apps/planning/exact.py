@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from factory.api import Array, Pace
-from factory.apps.planning.divisions import Batch, Divisions, Late, TooLate, never
+from factory.apps.planning.divisions import Batch, Divisions, Late, Levels, TooLate, never
 from factory.apps.planning.subsets import LEVEL_PRICES, UNDER, Masks, Subsets
 from factory.theory.plant.approaches import MARGIN
 
@@ -159,6 +159,19 @@ def _first_least(values: Array, starts: Masks) -> Masks:
     return np.asarray(equal[np.searchsorted(equal, starts)])
 
 
+@dataclass(frozen=True, slots=True)
+class Piling:
+    """One way to form the piles of some divisions on robots that have taken so many inputs beyond
+    two (`stops`): their `worth` (stops, 2, k), less is better, the `pile` (k,) and what is to
+    `come` (k,), and the operation."""
+
+    stops: tuple[int, ...]
+    worth: Array
+    pile: Masks
+    come: Masks
+    how: str
+
+
 class Best:
     """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots,
     each worth ROBOT [m], and smallest sub-assemblies. If the bound is None, no robot stays with a
@@ -187,60 +200,54 @@ class Best:
     def _solve(self, batch: Batch) -> None:
         starts = batch.starts
         wholes = batch.whole[starts]
-        for axis in (0, 1):
-            for stops in range(self.stops):
-                options = self._options(batch, axis, stops)
-                least = [np.minimum.reduceat(worth, starts) for worth, *_ in options]
-                if least:
-                    self.piles[stops, axis, wholes] = np.minimum.reduce(least)
-            self.made[axis, wholes] = self.piles[:, axis, wholes].min(axis=0)
+        for option in self._options(batch):
+            least = np.minimum.reduceat(option.worth, starts, axis=-1)
+            for stops, worth in zip(option.stops, least, strict=True):
+                self.piles[stops, :, wholes] = np.minimum(self.piles[stops, :, wholes], worth.T)
+        self.made[:, wholes] = self.piles[:, :, wholes].min(axis=0)
         for axis in (0, 1):
             turned = self.made[1 - axis, wholes] + RELAY * LONG**2 + ROBOT
             self.made[axis, wholes] = np.minimum(self.made[axis, wholes], turned)
 
-    def _options(
-        self, batch: Batch, axis: int, stops: int
-    ) -> list[tuple[Array, Masks, Masks, str]]:
-        """All ways to form piles: their worth (less is better), both sides (the pile first), and
-        the operation."""
-        one, other, prices = batch.one, batch.other, batch.prices
+    def _options(self, batch: Batch) -> list[Piling]:
+        """All ways to form piles."""
+        one, other = batch.one, batch.other
         fixed = self.task.subsets.penalty[batch.whole] * LONG**2 + self.task.leg[batch.whole]
-        options = []
-        if stops == 0:
-            worth = self._mates(batch.whole, axis, one, other, prices) + fixed
-            options.append((worth, one, other, "mate"))
-        if stops > 0 or (self.bound == np.inf and not self.mates):
-            worth = self._inserts(batch.whole, axis, stops, one, other, prices) + fixed
-            options.append((worth, one, other, "insert"))
-            worth = self._inserts(batch.whole, axis, stops, other, one, prices) + fixed
-            worth[self.task.subsets.based[batch.whole]] = np.inf
-            options.append((worth, other, one, "insert"))
+        options = [Piling((0,), (self._mates(batch) + fixed)[None], one, other, "mate")]
+        stops = () if self.mates else tuple(range(1, self.stops)) or (0,)
+        if stops:
+            worth = self._inserts(batch, stops, one, other, batch.onto[:, 0]) + fixed
+            options.append(Piling(stops, worth, one, other, "insert"))
+            worth = self._inserts(batch, stops, other, one, batch.onto[:, 1]) + fixed
+            worth[:, :, self.task.subsets.based[batch.whole]] = np.inf
+            options.append(Piling(stops, worth, other, one, "insert"))
         return options
 
-    def _mates(self, whole: Masks, axis: int, one: Masks, other: Masks, prices: Array) -> Array:
-        slides = prices[:, axis] <= prices[:, 2]
-        cost = np.where(slides, prices[:, axis], prices[:, 2])
-        worth = self.made[1 - axis, one] + self.made[1 - axis, other]
-        worth = worth + cost * LONG**2 + ROBOT
+    def _mates(self, batch: Batch) -> Array:
+        """The worth (2, k) of what a third robot takes."""
+        one, other, prices = batch.one, batch.other, batch.prices.T
+        slides = prices[:2] <= prices[2]
+        cost = np.where(slides, prices[:2], prices[2])
+        made = self.made[::-1]
+        worth = made[:, one] + made[:, other] + cost * LONG**2 + ROBOT
         if self.bound < np.inf:
-            time = np.maximum(self.stop[one], self.stop[other]) + self.task.delivering[whole]
+            time = np.maximum(self.stop[one], self.stop[other]) + self.task.delivering[batch.whole]
             lift = self.task.expected.lift(self.task.strokes(one, other))
             worth[time + np.where(slides, 0.0, lift) > self.bound + 1e-9] = np.inf
         return np.asarray(worth)
 
     def _inserts(
-        self, whole: Masks, axis: int, stops: int, pile: Masks, come: Masks, prices: Array
+        self, batch: Batch, stops: tuple[int, ...], pile: Masks, come: Masks, onto: Levels
     ) -> Array:
-        side = 0 if self.task.divisions.up > 0 else 1
-        level = self.task.subsets.level(self.task.divisions.axis, side, come, pile)
-        cost = np.minimum(prices[:, axis], LEVEL_PRICES[level])
-        before = self.piles[max(stops - 1, 0), axis, pile]
+        """The worth (stops, 2, k) of what the robot of a pile takes."""
+        cost = np.minimum(batch.prices.T[:2], LEVEL_PRICES[onto])
         cost = cost + UNDER * self.task.subsets.under(pile, come)
-        worth = before + self.made[1 - axis, come] + cost * LONG**2
+        before = self.piles[[max(number - 1, 0) for number in stops]][:, :, pile]
+        worth = before + self.made[::-1, come] + cost * LONG**2
         if self.bound < np.inf:
-            time = self.stop[come] + self.step[come]
-            time = time * stops + self.stop[pile] + self.task.delivering[whole]
-            worth[time > self.bound + 1e-9] = np.inf
+            time = (self.stop[come] + self.step[come]) * np.array(stops)[:, None]
+            time = time + self.stop[pile] + self.task.delivering[batch.whole]
+            worth = np.where(time[:, None] > self.bound + 1e-9, np.inf, worth)
         return np.asarray(worth)
 
     def tree(self, whole: int, axis: int, leaf: Leaf = lambda unit, _: unit) -> Tree:
@@ -254,10 +261,12 @@ class Best:
         return tuple(self._inputs(whole, axis, stops, leaf))
 
     def _inputs(self, whole: int, axis: int, stops: int, leaf: Leaf) -> list[Tree]:
-        options = self._options(self.task.divisions.of(whole), axis, stops)
-        worth, one, other, how = min(options, key=lambda o: float(o[0].min()))
-        n = int(worth.argmin())
+        options = [o for o in self._options(self.task.divisions.of(whole)) if stops in o.stops]
+        rows = [option.worth[option.stops.index(stops), axis] for option in options]
+        chosen = int(np.argmin([row.min() for row in rows]))
+        n, option = int(rows[chosen].argmin()), options[chosen]
+        one, other = option.pile, option.come
         last = self.tree(int(other[n]), 1 - axis, leaf)
-        if how == "mate":
+        if option.how == "mate":
             return [self.tree(int(one[n]), 1 - axis, leaf), last]
         return [*self._inputs(int(one[n]), axis, max(stops - 1, 0), leaf), last]

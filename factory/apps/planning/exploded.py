@@ -14,6 +14,7 @@ from factory.apps.planning.source import surface
 from factory.film.ink import Pixels
 from factory.film.picture import Size
 from factory.film.reel import write_still
+from factory.film.smoothing import smooth
 from factory.film.video import VideoFile, check_output
 from factory.floor.geometry.sight import View, fit, towards
 
@@ -119,7 +120,8 @@ class _Stage(LooseParts):
     def picture(self, done: float, view: View) -> Pixels:
         """When so many operations are done."""
         self._place(done)
-        return np.ascontiguousarray(self.renderer.draw(view, self.shown.faces <= MANY)[::-1])
+        drawn = self.renderer.draw(view, self.shown.faces <= MANY)
+        return smooth(np.ascontiguousarray(drawn[::-1]))
 
     def _place(self, done: float) -> None:
         if done != self.last:

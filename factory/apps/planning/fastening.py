@@ -20,6 +20,9 @@ from factory.apps.planning.subsets import ROOT_AXIS, Stance
 from factory.apps.planning.threads import Thread
 from factory.apps.planning.writing import Screwed
 
+ROW = 1e-3
+"""Screws are in one row if the next one is no further than this along their carrier's way [m]."""
+
 
 def fasteners(source: InPlace, named: Sequence[str]) -> tuple[str, ...]:
     """The units of a source that are screws: those that are `named`, and parts that are recognised
@@ -116,7 +119,7 @@ class Fastening:
         or a driver to it (`turned`)."""
         joins = list[Join]()
         there = self._with_screws(place.units, place.path)
-        for unit in come:
+        for unit in self._in_rows(come, place):
             join = self._way(unit, there, place.axis, upright)
             if join is None or not self._passes(unit, place):
                 return []
@@ -125,6 +128,20 @@ class Fastening:
             joins.append(join)
             there = (*there, unit)
         return joins
+
+    def _in_rows(self, come: Sequence[int], place: _Place) -> Iterator[int]:
+        """Some units in an order in which their carrier, which goes on along an axis of the floor,
+        goes the least: row by row across its way, to and fro, the row that is ahead first."""
+        middles = (self.graphs.low + self.graphs.high) / 2 @ self.up.rotation.T
+        along, across = middles[:, 1 - place.axis], middles[:, place.axis]
+        rows, last = list[list[int]](), np.inf
+        for unit in sorted(come, key=lambda unit: -float(along[unit])):
+            if last - along[unit] > ROW:
+                rows.append([])
+            rows[-1].append(unit)
+            last = along[unit]
+        for number, row in enumerate(rows):
+            yield from sorted(row, key=lambda unit: float(across[unit]), reverse=number % 2 > 0)
 
     def _with_screws(self, units: Units, path: tuple[int, ...]) -> Units:
         """Units, and the screws that are driven in at a path or below it, with their rings."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -131,7 +132,10 @@ def _prices(levels: NDArray[np.int8], sets: Sets) -> Array:
     prices = np.zeros(len(sets))
     for level, price in ((DEEPER, LOOSE), (LOCKED, PASSES), (CLASHES, BLOCKED)):
         meets = sets.astype(np.float32) @ (levels >= level).astype(np.float32)
-        prices[((meets > 0) & ~sets).any(axis=1)] = price
+        met = ((meets > 0) & ~sets).any(axis=1)
+        prices[met] = price
+        if not met.any():
+            break
     return prices
 
 
@@ -206,24 +210,25 @@ def bettered(
 ) -> Iterator[Judged]:
     """Ever better trees, from a first one on, within a bound on expected cycles [s], until it is
     late or ROUNDS neighbourhoods of each join brought no improvement."""
-    best = site.judged(first)
+
+    @cache
+    def solution_of(groups: tuple[Joined, ...], axis: int) -> Tree | None:
+        return solved(site, groups, axis, bound)
+
+    best, idle = site.judged(first), 0
+    places = _joins(best.tree)
     yield best
-    idle = 0
-    while not late():
-        joins = [place for place in _places(best.tree) if place]
-        joins.append(())
-        if idle > ROUNDS * len(joins):
-            return
-        place = joins[int(random.integers(len(joins)))]
+    while not late() and idle <= ROUNDS * len(places):
+        place = places[int(random.integers(len(places)))]
         node, axis = _at(best.tree, place), (ROOT_AXIS + len(place)) % 2
         groups = _groups(node, axis, random)
-        solution = solved(site, groups, axis, bound) if len(groups) > 2 else None
+        solution = solution_of(groups, axis) if len(groups) > 2 else None
         idle += 1
         if solution is None or solution == node:
             continue
         other = site.judged(_replaced(best.tree, place, solution))
         if _worth(other, bound) < _worth(best, bound):
-            best, idle = other, 0
+            best, places, idle = other, _joins(other.tree), 0
             yield best
 
 
@@ -233,8 +238,12 @@ def _worth(judged: Judged, bound: float) -> tuple[float, ...]:
     return judged.price, round(over, 6), judged.robots, round(judged.sizes, 6)
 
 
+def _joins(tree: Tree) -> list[tuple[int, ...]]:
+    """The ways from the root to all joins of a tree, the last of them last."""
+    return [*filter(None, _places(tree)), ()]
+
+
 def _places(tree: Tree, place: tuple[int, ...] = ()) -> Iterator[tuple[int, ...]]:
-    """The ways from the root to all joins of a tree."""
     if not isinstance(tree, int):
         yield place
         for number, below in enumerate(tree):
@@ -254,7 +263,7 @@ def _replaced(tree: Tree, place: tuple[int, ...], by: Tree) -> Tree:
     return (*tree[:first], _replaced(tree[first], tuple(rest), by), *tree[first + 1 :])
 
 
-def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Joined]:
+def _groups(node: Tree, axis: int, random: np.random.Generator) -> tuple[Joined, ...]:
     """The sub-assemblies below a join, divided further until there are about SMALL groups."""
     open_ = [(node, axis)]
     while True:
@@ -265,10 +274,10 @@ def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Joined]:
         chosen = fits[int(random.integers(len(fits)))]
         tree, along = open_.pop(chosen)
         open_ += [(below, 1 - along) for below in tree]
-    return [
+    return tuple(
         Joined(units_of(tree), tree, -1 if isinstance(tree, int) else along)
         for tree, along in open_
-    ]
+    )
 
 
 def units_of(tree: Tree) -> Units:

@@ -51,8 +51,9 @@ LOOSE_SAMPLES = 12
 
 
 class LooseParts(Closing):
-    """Draws the parts of a product alone, moved from their places, with a GL context of its own.
-    Its arguments are those of `loose_parts`. Raises MissingError where there is no GL."""
+    """Draws the parts of a product alone, moved from their places, with a GL context of its own, by
+    one sample a pixel. Its arguments are those of `loose_parts`. Raises MissingError where there is
+    no GL."""
 
     def __init__(
         self,
@@ -65,6 +66,7 @@ class LooseParts(Closing):
         gl.probe()
         model = loose_parts(surfaces, colours, floor, extent)
         model.vis.global_.offwidth, model.vis.global_.offheight = size
+        model.vis.quality.offsamples = 0
         self.replica = Replica(model)
         self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
         self.renderer = Renderer(self.replica, size)

@@ -63,6 +63,12 @@ parts that get a little deeper. A relay costs less than any of these."""
 LEVEL_PRICES = np.array([0.0, LOOSE, PASSES, UNHELD, BLOCKED, np.inf])
 """The prices of an operation by its level: free, as named above, and impossible."""
 
+WAY_LEVELS = np.array([[5], [1], [2], [4]], np.uint8)
+"""The level of a division of which one side is among the `Subsets.ways` of the other."""
+
+UNHELD_LEVEL = np.uint8(3)
+"""The level of a division of which no hand can hold a side."""
+
 APART, TIPS, FALLS, UNDER = 1e5, 2e4, 10.0, 5.0
 """The price of a sub-assembly that is not connected, of one that would tip over by itself, of one
 of which something would fall, and of an operation that puts a part under a pile."""
@@ -125,13 +131,12 @@ class Subsets:
     def level(self, axis: int, side: int, going: Masks, staying: Masks) -> NDArray[np.uint8]:
         """The levels (k,) of blocking, by which LEVEL_PRICES has the prices, of subsets that leave
         along an axis to the upper (0) or lower (1) side, past those that stay."""
-        levels = np.zeros(len(going), np.uint8)
+        met = (self.ways[:, axis, side][:, going] & staying) != 0
+        levels = np.asarray((met * WAY_LEVELS).max(axis=0))
         for mine, theirs in self.unheld:
             for one, other in ((going, staying), (staying, going)):
-                levels[(one == mine) & (other & theirs == theirs)] = 3
-        for number, ways in ((1, 1), (2, 2), (4, 3), (5, 0)):
-            met = (self.ways[ways, axis, side][going] & staying) != 0
-            levels[met] = np.maximum(levels[met], number)
+                unheld = (one == mine) & (other & theirs == theirs)
+                levels[unheld] = np.maximum(levels[unheld], UNHELD_LEVEL)
         return levels
 
 
@@ -145,11 +150,7 @@ def subsets(graphs: Blocking) -> Subsets:
         graphs.levels >= LOCKED,
         graphs.levels >= CLASHES,
     )
-    ways = np.zeros((4, 3, 2, size), np.int64)
-    for number, level in enumerate(levels):
-        for axis in AXES:
-            ways[number, axis, 0] = _unions(level[axis])
-            ways[number, axis, 1] = _unions(level[axis].T)
+    ways = _unions(np.stack([[level, level.swapaxes(1, 2)] for level in levels]).swapaxes(1, 2))
     low, high = np.full((3, size), np.inf), np.full((3, size), -np.inf)
     members = np.zeros(size, np.int64)
     for unit in range(count):
@@ -173,13 +174,13 @@ def _mask(units: Iterable[int]) -> int:
 
 
 def _unions(table: NDArray[np.bool_]) -> Masks:
-    """The union (s,) of the rows of a relation (n, n) over each subset."""
-    count = len(table)
+    """The union (..., s) of the rows of relations (..., n, n) over each subset."""
+    count = table.shape[-1]
     rows = table @ (1 << np.arange(count, dtype=np.int64))
-    unions = np.zeros(1 << count, np.int64)
+    unions = np.zeros((*rows.shape[:-1], 1 << count), np.int64)
     for unit in range(count):
         step = 1 << unit
-        unions[step : 2 * step] = unions[:step] | rows[unit]
+        unions[..., step : 2 * step] = unions[..., :step] | rows[..., unit, None]
     return unions
 
 
@@ -187,12 +188,11 @@ def _hanging(touch: NDArray[np.bool_], members: Masks) -> NDArray[np.bool_]:
     """Which subsets are connected (s,): those in which some unit touches the rest, and the rest is
     connected. So are those of which all units rest on one, in a relation that is not symmetric."""
     count = len(touch)
-    reach = (touch & ~np.eye(count, dtype=bool)) @ (1 << np.arange(count, dtype=np.int64))
+    units = 1 << np.arange(count, dtype=np.int64)
+    reach = (touch & ~np.eye(count, dtype=bool)) @ units
     hangs = members <= 1
     for number in range(2, count + 1):
-        of_size = np.flatnonzero(members == number)
-        for unit in range(count):
-            has = of_size[(of_size >> unit & 1) == 1]
-            rest = has ^ (1 << unit)
-            hangs[has] |= hangs[rest] & ((rest & reach[unit]) != 0)
+        of_size = np.flatnonzero(members == number)[:, None]
+        rest = of_size & ~units
+        hangs[of_size[:, 0]] = (hangs[rest] & (rest != of_size) & (rest & reach != 0)).any(axis=1)
     return hangs

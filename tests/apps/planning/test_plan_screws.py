@@ -3,6 +3,8 @@ their bolts, and equal screws share a driver."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +16,14 @@ from factory.apps.planning.fastening import fasteners
 from factory.apps.planning.names import Says, says
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
+from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.writing import planned_product, screws_in
+from factory.engine.timing.timed import pace
+from factory.pipeline import all_templates
 from factory.theory.problem.pag import PAG
+from factory.theory.problem.plan import Plan
 from tests.command_line import Terminal
+from tests.paths import ROOT
 from tests.plan_models import box, model_source, rod
 
 QUICK = PlanOptions(lay_out=False)
@@ -63,6 +70,28 @@ def test_screws_come_after_what_they_clamp_one_after_the_other(name: str, tmp_pa
         if set(join.come) <= labels:
             assert {"base", "lid"} <= set(join.pile) and join.direction == (0, 0, 1)
     assert "are driven in as screws" in found.notes[-1]
+
+
+def test_screws_are_driven_row_by_row_as_their_carrier_goes_on(tmp_path: Path) -> None:
+    """In the order of their labels the second and the third would lie across from each other."""
+    source = model_source(tmp_path, lidded("screw"))
+    found = plan(source, QUICK)
+    assert isinstance(found, Planned)
+    at = {part.label: found.orientation @ part.vertices.mean(axis=0) for part in source.parts}
+    ways = np.diff([at[label] for label in screws_in(found.tree)], axis=0)
+    assert (ways[:, 0] < 1e-6).all()
+    assert (np.abs(ways[:, :2]) > 1e-6).sum() == len(ways)
+
+
+@pytest.mark.slow
+def test_one_driver_takes_at_most_15_percent_longer_than_four(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, ROOT / "examples" / "make_gadget.py", tmp_path], check=True)
+    found = plan(read_source(tmp_path, all_templates(), SourceOptions("mm")))
+    assert isinstance(found, Planned) and found.project is not None
+    assert found.figures.robots <= 13 and [len(line) for line in found.lines] == [4]
+    alone = found.project.with_plan(Plan())
+    longest = 1.15 * pace(alone.layout, alone.settings)[0].seconds
+    assert found.figures.cycle is not None and found.figures.cycle <= longest
 
 
 def test_screws_that_close_nothing_in_come_before_what_covers_them(tmp_path: Path) -> None:
@@ -255,7 +284,7 @@ def test_equal_screws_share_one_driver_and_what_is_screwed_runs(
     assert done.json["figures"]["robots"] == 5
     checked = run("check", done.json["pag"], "--json").json
     (feeder,) = checked["lines"]
-    assert feeder["labels"] == ["screw1", "screw4"] and checked["robots"] == 5
+    assert feeder["labels"] == ["screw4", "screw1"] and checked["robots"] == 5
     made = run("run", done.json["pag"], "--units", 2, "--json")
     assert made.json["refines_net"] and made.status == 0, made.err
     settings = tmp_path / "mine" / "factory.toml"

@@ -141,7 +141,8 @@ def plan(
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
     written = read(files[0], folders)
-    project = with_lines(written.with_product(written.product, as_drawn=True), planned.lines)
+    shapes = (planned.project or written).product
+    project = with_lines(written.with_product(shapes, as_drawn=True), planned.lines)
     if stopped and not out.silent:
         say("  stopped: the best tree so far, without pictures")
     announced_before = set(map(id, project.product.warnings))
