@@ -309,7 +309,7 @@ def test_no_pictures_are_made_after_a_signal(
 
 
 ENDLESS = """
-import os, signal, sys, time
+import os, signal, sys, threading
 from factory.floor.geometry import product
 as_given = product.in_pieces
 def in_pieces(mesh, stood_in=False, decomposed=True):
@@ -317,7 +317,7 @@ def in_pieces(mesh, stood_in=False, decomposed=True):
         return as_given(mesh, stood_in, decomposed)
     if sys.argv[1] == "signal":
         os.kill(os.getpid(), signal.SIGINT)
-    time.sleep(600)
+    threading.Event().wait(600)
 product.in_pieces = in_pieces
 from factory.commands import main
 main(sys.argv[2:])

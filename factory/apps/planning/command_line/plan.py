@@ -272,8 +272,8 @@ def _print(placed: InPlace, planned: Planned, project: Project, out: OutputOptio
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     ways += _for_hulls(planned.hidden)
-    told = f"; ways: {ways}" if ways else ""
-    say(f"{project.file}: {parts} parts, {operations} operations{told}")
+    by_kind = f"; ways: {ways}" if ways else ""
+    say(f"{project.file}: {parts} parts, {operations} operations{by_kind}")
     for note in planned.notes:
         say(note)
     best = "optimal by estimate" if planned.optimal else "the best found"
