@@ -111,11 +111,11 @@ def side_by_side(
 
     for _ in range(min(len(tasks), os.cpu_count() or 1)):
         Thread(target=do, daemon=True).start()
-    undone = {done for _, done in tasks}
+    pending = {done for _, done in tasks}
     try:
-        while undone:
-            undone = wait(undone, OFTEN, FIRST_COMPLETED).not_done
-            report(len(tasks) - len(undone), len(tasks))
+        while pending:
+            pending = wait(pending, OFTEN, FIRST_COMPLETED).not_done
+            report(len(tasks) - len(pending), len(tasks))
     finally:
         deque(left, maxlen=0)
     return [done.result() for _, done in tasks]
