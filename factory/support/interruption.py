@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import Future, as_completed
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
 from threading import Thread
 from types import FrameType
@@ -19,6 +20,10 @@ T = TypeVar("T")
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 ]
+
+
+OFTEN = 0.5
+"""The longest time between two reports of work that is done side by side [s]."""
 
 
 def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[int, Any]:
@@ -91,9 +96,9 @@ def side_by_side(
     works: Sequence[Callable[[], T]], report: Callable[[int, int], None] = lambda *_: None
 ) -> list[T]:
     """What each of `works` gives, in their order, done in as many threads as there are processors,
-    while the caller hears signals, and calls `report` with how many are done, and of how many.
-    Raises as the first that fails does. Work that is interrupted is left alone, and ends with the
-    program."""
+    while the caller hears signals, and calls `report` with how many are done, and of how many, at
+    least twice a second. Raises as the first that fails does, or as `report` does. Work that is
+    interrupted is left alone, and ends with the program; no other is begun then."""
     tasks = [(work, Future[T]()) for work in works]
     left = iter(tasks)
 
@@ -106,8 +111,13 @@ def side_by_side(
 
     for _ in range(min(len(tasks), os.cpu_count() or 1)):
         Thread(target=do, daemon=True).start()
-    for number, _ in enumerate(as_completed([done for _, done in tasks]), 1):
-        report(number, len(tasks))
+    pending = {done for _, done in tasks}
+    try:
+        while pending:
+            pending = wait(pending, OFTEN, FIRST_COMPLETED).not_done
+            report(len(tasks) - len(pending), len(tasks))
+    finally:
+        deque(left, maxlen=0)
     return [done.result() for _, done in tasks]
 
 

@@ -83,6 +83,18 @@ def test_a_thin_wall_on_the_way_is_cut():
     assert way.depth == pytest.approx(5e-5, rel=1e-6)
 
 
+def test_walls_that_are_upright_up_to_rounding_are_swept_as_they_are():
+    """Of many that face the way, each by itself: their prisms touch in edges."""
+    plain = rod(5, 30).refine(12)
+    noise = np.random.default_rng(5).normal(0.0, 2e-9, (3, plain.num_vert()))
+    body = plain.warp_batch(lambda corners: corners + noise[:, : len(corners)].T)
+    wall = block(40, 40, 4, at=(0, 0, 40))
+    way = common(swept(body, np.array([0, 0, 0.06])), wall, both=False)
+    area = plain.volume() / 0.03
+    assert way.volume == pytest.approx(4e-3 * area, rel=1e-4)
+    assert way.depth == pytest.approx(2e-3, rel=0.02)
+
+
 def test_sliding_along_a_face_cuts_nothing():
     floor = block(200, 200, 10, at=(0, 0, -7.5))
     turned = [body.rotate([0, 0, 29]) for body in (block(5, 5, 5), floor)]

@@ -58,10 +58,17 @@ hard = resource.getrlimit(resource.RLIMIT_AS)[1]
 most = {MEMORY} if hard == resource.RLIM_INFINITY else min(hard, {MEMORY})
 resource.setrlimit(resource.RLIMIT_AS, (most, hard))
 import cascadio
-cascadio.step_to_glb(sys.argv[1], sys.argv[2])
+cascadio.step_to_glb(sys.argv[1], sys.argv[2], float(sys.argv[3]))
 """
 
 BEGIN = b"ISO-10303-21"
+
+STEPS = FINE, _, COARSE = 0.01, 0.03, 0.1
+"""Distances of triangles from the faces of a STEP file [mm]. Fits are seen by the first."""
+
+SHARE = 1e-4
+"""The distance is at most this share of the longest edge of a component's box: a fine step would
+give a large component a hundred thousand triangles."""
 
 
 def read_scene(content: bytes, suffix: str) -> Bodies:
@@ -143,23 +150,44 @@ def read_step(content: bytes) -> list[GlbBody]:
     if BEGIN not in content[:4096]:
         raise UnreadableMesh(f"it is not {EXPECTED['.step']}")
     with TemporaryDirectory() as folder:
-        source, made = Path(folder) / "a.step", Path(folder) / "a.glb"
+        source = Path(folder) / "a.step"
         source.write_bytes(content)
-        none = subprocess.DEVNULL
-        words = [sys.executable, "-c", CONVERT, str(source), str(made)]
-        done = subprocess.run(words, cwd=folder, stdin=none, stdout=none, stderr=none, check=False)
-        if not made.exists():
-            ended = f"; it ended with status {done.returncode}" if done.returncode else ""
-            why = f"OpenCASCADE finds no faces in it{ended}; it should be {EXPECTED['.step']}"
-            raise UnreadableMesh(why)
-        try:
-            glb = read_bytes(made, MESH)
-        except OSError:
-            raise UnreadableMesh("it has too many triangles: export it as GLB, coarser") from None
-    return [
-        GlbBody(body.names, body.bodies, tuple(map(_stated, body.colours)))
-        for body in read_glb(glb, np.eye(4))  # the axes are those of the STEP file
-    ]
+        made = {COARSE: _triangles(source, COARSE)}
+        wanted = [_deflection(body) for body in made[COARSE]]
+        made |= {one: _triangles(source, one) for one in {*wanted} - {COARSE}}
+    finest = made[min(made)]
+    if any(len(bodies) != len(finest) for bodies in made.values()):
+        wanted = [min(made)] * len(finest)
+    bodies = [made[deflection][number] for number, deflection in enumerate(wanted)]
+    return [GlbBody(body.names, body.bodies, tuple(map(_stated, body.colours))) for body in bodies]
+
+
+def _deflection(body: GlbBody) -> float:
+    """How far the triangles of a component may be from its faces [mm]: a step between FINE and
+    COARSE that is at most a SHARE of the longest edge of its box."""
+    points = np.concatenate([vertices for vertices, _ in body.bodies])
+    longest = 1e3 * float(np.ptp(points, axis=0).max())
+    return max((step for step in STEPS if step <= SHARE * longest), default=FINE)
+
+
+def _triangles(source: Path, deflection: float) -> list[GlbBody]:
+    """The components of a STEP file, at most so far from their faces [mm]. Raises
+    UnreadableMesh."""
+    made, none = source.with_suffix(".glb"), subprocess.DEVNULL
+    made.unlink(missing_ok=True)
+    words = [sys.executable, "-c", CONVERT, str(source), str(made), str(deflection)]
+    done = subprocess.run(
+        words, cwd=source.parent, stdin=none, stdout=none, stderr=none, check=False
+    )
+    if not made.exists():
+        ended = f"; it ended with status {done.returncode}" if done.returncode else ""
+        why = f"OpenCASCADE finds no faces in it{ended}; it should be {EXPECTED['.step']}"
+        raise UnreadableMesh(why)
+    try:
+        glb = read_bytes(made, MESH)
+    except OSError:
+        raise UnreadableMesh("it has too many triangles: export it as GLB, coarser") from None
+    return read_glb(glb, np.eye(4))  # the axes are those of the STEP file
 
 
 def _stated(colour: Colour) -> Colour:

@@ -44,6 +44,10 @@ ALIKE = 0.01
 """Figures that differ by less than this share are equal."""
 
 
+class OutOfTime(Exception):
+    """The time is over, or a signal came, while parts are decomposed for a first layout."""
+
+
 @dataclass(frozen=True)
 class LaidOut:
     """A judged tree, as a `tree` of labels and as a `project`; `kinds`: the number of different
@@ -120,19 +124,24 @@ class Layouts:
         self._units = [label for label, _ in source.units()]
         self._kinds = {part.label: part.kind for part in source.parts}
 
-    def of(self, judged: Judged) -> LaidOut:
-        """A judged tree as a project, which is laid out on demand."""
+    def drafted(self, judged: Judged) -> LaidOut:
+        """A judged tree as a project, without its geometry."""
         tree = self.labelled(judged.tree)
         made = planned_product(self.source, tree, judged.stance.rotation)
         text = next(iter(made.files.values())).decode()
         pag = read_pag(text, self.templates, folder=None)
-        plain = Project(pag, self.templates, self.catalogue, self.settings, Ground())
+        project = Project(pag, self.templates, self.catalogue, self.settings, Ground())
+        return LaidOut(judged, tree, project, self.kinds(judged.tree))
+
+    def of(self, judged: Judged) -> LaidOut:
+        """A judged tree as a project, which is laid out on demand. Raises as `report` does."""
+        laid = self.drafted(judged)
+        tree, plain = laid.tree, laid.project
         if judged.stance not in self._products:
-            product = product_geometry(pag, self.source.files, report=self.report)
+            product = product_geometry(plain.pag, self.source.files, report=self.report)
             twin = self.source.product, judged.stance.rotation
             self._products[judged.stance] = replace(product, twin=twin)
         project = plain.with_product(self._products[judged.stance], as_drawn=True)
-        laid = LaidOut(judged, tree, project, self.kinds(judged.tree))
         lines = [one for line in screw_lines(tree, self._kinds) for one in _lines(project, line)]
         why = self._spread(screws_in(tree), lines)
         shared = with_lines(project, lines)
@@ -205,7 +214,7 @@ class Layouts:
         """The best of some trees, or of those about as good the one that makes most sense. As many
         are laid out as the budget permits, at least the first: those of LAID robots together, or as
         many as time permits, where the next one is assumed to take as long as the longest did. A
-        KeyboardInterrupt ends the layout of any but the first."""
+        KeyboardInterrupt, or OutOfTime, ends the layout of any but the first."""
         every: list[LaidOut] = []
         longest, robots = 0.0, 0
         for judged in trees:
@@ -217,7 +226,7 @@ class Layouts:
             try:
                 laid = self.or_alone(self.of(judged))
                 laid.rank(aim)
-            except KeyboardInterrupt:
+            except (KeyboardInterrupt, OutOfTime):
                 if not every:
                     raise
                 break

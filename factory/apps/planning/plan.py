@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ from factory.apps.planning.exact import Expected
 from factory.apps.planning.falling import held_by, senseless
 from factory.apps.planning.fastening import fasteners
 from factory.apps.planning.judging import Join, Judged
-from factory.apps.planning.laying import LaidOut, Layouts, best_of
+from factory.apps.planning.laying import LaidOut, Layouts, OutOfTime, best_of
 from factory.apps.planning.parts import InPlace, refuse_hidden
 from factory.apps.planning.posing import (
     Pose,
@@ -61,6 +62,9 @@ DECOMPOSING = "decomposing parts into convex bodies"
 
 LAYING = "laying out"
 """The name of the last stage of planning."""
+
+GRACE = 1.0
+"""If the time is over, decomposition before the first layout may still take so long [s]."""
 
 HELD, AGAIN = 3, 1
 """So often trees of a few units are sought again in which what no hand can hold is joined
@@ -227,8 +231,12 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
     if asked.lay_out:
         asked.told(DECOMPOSING, 1, None, "")
 
+    begun = monotonic()
+
     def decomposed(done: int, total: int) -> None:
         asked.told(DECOMPOSING, done, total, "meshes")
+        if done < total and budget.left == 0.0 and monotonic() - begun > GRACE:
+            raise OutOfTime
 
     layouts = Layouts(source, templates, asked.settings, decomposed)
     if not asked.lay_out:
@@ -240,7 +248,11 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         words = f"{best.robots} robots, {best.seconds:.2f} s"
         asked.told(LAYING, laid[0], len(sought.all), words)
 
-    best = layouts.best(sought.all, asked.aim, budget, said)
+    try:
+        best = layouts.best(sought.all, asked.aim, budget, said)
+    except OutOfTime:
+        drafted = layouts.drafted(sought.all[0])
+        return replace(_result(pose, drafted, False, 0, firm), screws=named)
     for _ in range(HELD):
         seeking = seeking.without(layouts.unheld(best)) if seeking else None
         if seeking is None or budget.left == 0.0 or len(graphs) - len(screws) > MOST:

@@ -137,7 +137,7 @@ def _meant(
 ) -> Iterator[AllowedOverlap]:
     """How deep units that may pass through others do so on their ways, and pairs `a:b`, and
     `threaded` parts with others, also when finished, up to a hundredth of a millimetre more."""
-    product = product_geometry(pag, source.files)
+    product = product_geometry(pag, source.files, decomposed=bool(allow))
     units = {part.label: label for label, parts in source.units() for part in parts}
     pairs = [{*name.split(":")} for name in allow]
     deep: dict[tuple[str, str], float] = {}

@@ -29,6 +29,7 @@ import numpy as np
 from factory.floor.geometry.meshes import is_closed, normals_of
 from factory.floor.geometry.pieces import closed_bodies
 from factory.floor.geometry.solids import Solid, rotation
+from factory.floor.geometry.touching import connected
 from factory.support.arrays import Array, Indices
 
 ROUND = 5e-6
@@ -134,19 +135,50 @@ def _surface(vertices: Array, faces: Indices) -> Any:
     return Manifold(Mesh64(np.ascontiguousarray(vertices), faces.astype(np.uint64)))
 
 
-def swept(body: Any, shift: Array) -> Any:
-    """The volume that a body sweeps when it is shifted by `shift` (3,) [m]."""
-    from manifold3d import Error, Manifold
+@dataclass(frozen=True, slots=True)
+class Sweep:
+    """The volume that a body sweeps, as bodies whose union it is. These are large and overlap all
+    along the way: what each has in common with another body is united instead."""
 
-    mesh = body.to_mesh64()
-    vertices, faces = merged(mesh)
+    bodies: tuple[Any, ...]
+
+    def __xor__(self, other: Any) -> Any:
+        from manifold3d import Manifold, OpType
+
+        return Manifold.batch_boolean([body ^ other for body in self.bodies], OpType.Add)
+
+    def translate(self, shift: Array) -> Sweep:
+        """The sweep, shifted (3,) [m]."""
+        return Sweep(tuple(body.translate(shift) for body in self.bodies))
+
+    def min_gap(self, other: Any, most: float) -> float:
+        """Its distance from a body [m], at most `most`."""
+        return float(min(body.min_gap(other, most) for body in self.bodies))
+
+    def ray_cast(self, start: Array, end: Array) -> list[Any]:
+        """Where a ray enters and leaves its bodies."""
+        return [hit for body in self.bodies for hit in body.ray_cast(start, end)]
+
+    def bounding_box(self) -> Array:
+        """The corners of its box, low and high (6,)."""
+        boxes = np.array([body.bounding_box() for body in self.bodies])
+        return np.concatenate([boxes[:, :3].min(axis=0), boxes[:, 3:].max(axis=0)])
+
+    def decompose(self) -> list[Any]:
+        """The connected ones of its bodies."""
+        return [part for body in self.bodies for part in body.decompose()]
+
+
+def swept(body: Any, shift: Array) -> Sweep:
+    """The volume that a body sweeps when it is shifted by `shift` (3,) [m]."""
+    vertices, faces = merged(body.to_mesh64())
     normals = normals_of(vertices, faces)
     lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
     front = faces[normals @ shift > FACING * lengths]
     if not len(front):
-        return body
-    used, inverse = np.unique(front, return_inverse=True)
-    near, count = inverse.reshape(-1, 3), len(used)
+        return Sweep((body,))
+    points, near = _fanned(vertices, front)
+    count = len(points)
     start, end = near.ravel(), np.roll(near, -1, axis=1).ravel()
     rim = ~np.isin(start * count + end, end * count + start)
     start, end = start[rim], end[rim]
@@ -156,13 +188,23 @@ def swept(body: Any, shift: Array) -> Any:
             np.column_stack([start, end + count, start + count]),
         ]
     )
-    points = np.concatenate([vertices[used], vertices[used] + shift])
-    ahead = _surface(points, np.concatenate([near[:, ::-1], near + count, walls]))
-    if ahead.status() != Error.NoError:  # the front touches itself in an edge: prism by prism
-        tips = vertices[front]
-        prisms = [Manifold.hull_points(np.concatenate([t, t + shift])) for t in tips]
-        ahead = Manifold.compose(prisms)
-    return Manifold.compose([body, ahead])
+    ahead = np.concatenate([near[:, ::-1], near + count, walls])
+    return Sweep((body, _surface(np.concatenate([points, points + shift]), ahead)))
+
+
+def _fanned(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
+    """Part of a closed surface, vertices and faces (m, 3), with a vertex for each fan: triangles
+    round a vertex that are joined edge to edge. Fans that meet in a vertex alone are separated, so
+    prisms over the part touch in no edge."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    begins = np.arange(faces.size)
+    ends = np.roll(begins.reshape(-1, 3), -1, axis=1).ravel()
+    edge, back = start * len(vertices) + end, end * len(vertices) + start
+    _, there, twin = np.intersect1d(edge, back, return_indices=True)
+    one, other = [begins[there], ends[there]], [ends[twin], begins[twin]]
+    fan = connected(np.stack([one, other], axis=-1).reshape(-1, 2), faces.size)
+    first = np.unique(fan, return_index=True)[1]
+    return vertices[start[first]], fan.reshape(-1, 3)
 
 
 def merged(mesh: Any) -> tuple[Array, Indices]:

@@ -10,7 +10,7 @@ triangulated; triangles are joined across the longest common sides, as long as t
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from itertools import islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -50,7 +50,7 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
         levels = _levels(placed, faces)
         if len(levels) < 2:
             continue
-        stack = [*_stacked(bounded(placed, faces), levels)]
+        stack = [*islice(_stacked(bounded(placed, faces), levels), MOST_PIECES + 1)]
         volumes = np.array([_area(base) * (high - low) for base, low, high in stack]) * size**3
         if len(stack) <= MOST_PIECES and abs(volumes.sum() - volume) <= EXACT * volume:
             thick = np.array([_breadth(base) for base, _, _ in stack]) * size

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from itertools import count, pairwise
 from pathlib import Path
@@ -303,6 +306,42 @@ def test_no_pictures_are_made_after_a_signal(
     assert done.status == 0, done.err
     assert "interrupt again to stop at once" in done.err
     assert not [name for name in files_in(tmp_path / "out") if name.endswith(("png", "mp4"))]
+
+
+ENDLESS = """
+import os, signal, sys, threading
+from factory.floor.geometry import product
+as_given = product.in_pieces
+def in_pieces(mesh, stood_in=False, decomposed=True):
+    if not decomposed:
+        return as_given(mesh, stood_in, decomposed)
+    if sys.argv[1] == "signal":
+        os.kill(os.getpid(), signal.SIGINT)
+    threading.Event().wait(600)
+product.in_pieces = in_pieces
+from factory.commands import main
+main(sys.argv[2:])
+"""
+"""Plans with parts that are decomposed for ever, with or without a signal meanwhile."""
+
+
+@pytest.mark.parametrize("ends", ["signal", "time"])
+def test_a_tree_is_written_however_long_its_parts_are_decomposed(tmp_path: Path, ends: str) -> None:
+    file, folder = puzzle(tmp_path, PEG), tmp_path / "out"
+    words = ["plan", file, "--replan", "-o", folder, "--json"]
+    words += ["--seconds", "0.001"] if ends == "time" else []
+    kept = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    done = subprocess.run(
+        [sys.executable, "-c", ENDLESS, ends, *map(str, words)],
+        env={**os.environ, **kept},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
+    document = json.loads(done.stdout)
+    assert document["figures"]["layouts"] == 0 and document["figures"]["cycle"] is None
+    assert labels_of(Path(document["pag"])) and document["joins"] == []
 
 
 HEAVY = """root = all; all = mate ( stem, slab );

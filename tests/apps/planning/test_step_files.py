@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from factory.apps.importing.scene_file import FINE, SHARE, read_step
 from factory.apps.planning.source import read_source
 from factory.floor.geometry.meshes import volume_of
 from factory.pipeline import all_templates
@@ -213,6 +214,26 @@ def test_what_another_writer_wrote_is_read_as_it_was_drawn(tmp_path: Path, name:
     text, drawn = OWN[name]
     (tmp_path / "a.step").write_text(text)
     assert_read(tmp_path / "a.step", drawn)
+
+
+@pytest.mark.parametrize(("prefix", "larger"), [(".CENTI.", 10), (".DECI.", 100)])
+def test_a_large_component_has_no_finer_facets_than_its_size_asks_for(
+    prefix: str, larger: int
+) -> None:
+    """The same assembly in larger units: as fine as before, it would have `larger` ** 0.5 times the
+    triangles."""
+    text = (DATA / "nested_assembly.step").read_text()
+    metres = text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({prefix},.METRE.)")
+    small, large = (read_step(content.encode()) for content in (text, metres))
+    for body, scaled in zip(small, large, strict=True):
+        (vertices, faces), (corners, triangles) = body.bodies[0], scaled.bodies[0]
+        assert np.ptp(corners, axis=0) == pytest.approx(larger * np.ptp(vertices, axis=0), rel=1e-2)
+        assert len(triangles) < 0.7 * larger**0.5 * len(faces) or len(faces) == 12
+        if "pin" in body.names[0]:
+            height = float(np.ptp(corners[:, 2]))
+            sides = len(np.unique(np.round(corners[:, :2], 6), axis=0))
+            sagitta = 4.9e-3 * larger * (1 - np.cos(np.pi / sides))
+            assert sagitta <= max(1e-3 * FINE, SHARE * height)
 
 
 @pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")

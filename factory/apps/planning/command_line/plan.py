@@ -34,6 +34,9 @@ LOOKS = ("exploded.png", "assembly.mp4")
 STOPPING = "stopping: the best tree so far is laid out; interrupt again to stop at once"
 """The message after a signal."""
 
+UNLAID = "not laid out: the time was over before its parts were decomposed into convex bodies"
+"""How good a tree is that was not laid out."""
+
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
 
@@ -141,6 +144,12 @@ def plan(
         return refuse(placed, planned, folder, look, out)
     files = write_planned(placed, planned, folder, source, allow, templates)
     written = read(files[0], folders)
+    if not planned.figures.layouts:
+        if out.as_json:
+            emit(_document(placed, planned, written, [*files], warnings))
+        else:
+            _print(placed, planned, written, out)
+        return 0
     shapes = (planned.project or written).product
     project = with_lines(written.with_product(shapes, as_drawn=True), planned.lines)
     if stopped and not out.silent:
@@ -164,7 +173,7 @@ def _sought(
 ) -> tuple[Planned | CannotAssemble, bool]:
     """The best plan found within the time or until a signal, or the reason why there is none; and
     whether there was a signal. Before a first tree is found a signal is raised at once."""
-    from factory.apps.planning.plan import LAYING
+    from factory.apps.planning.plan import DECOMPOSING, LAYING
     from factory.apps.planning.plan import plan as sought
     from factory.support.interruption import Interruption
 
@@ -174,7 +183,7 @@ def _sought(
     ):
 
         def show(what: str, done: int, total: int | None, words: str) -> None:
-            stop.keeps = done > 0 and what != LAYING
+            stop.keeps = what == DECOMPOSING or (done > 0 and what != LAYING)
             bar.show(what, done, total, words)
 
         search = replace(asked, told=show, stopped=lambda: stop.noted)
@@ -214,8 +223,10 @@ def _document(
     warnings: list[dict[str, Any]],
 ) -> dict[str, Any]:
     """The keys of `plan --json`."""
-    matings = project.matings
-    labels = {id(join): label for label, join in _by_label(placed, planned, project).items()}
+    matings = project.matings if planned.figures.layouts else None
+    by_label = _by_label(placed, planned, project) if matings else {}
+    labels = {id(join): label for label, join in by_label.items()}
+    joins = planned.operations if matings else ()
     return {
         **({"hulls": [asdict(pair) for pair in planned.hidden]} if planned.hidden else {}),
         "pag": str(project.file),
@@ -228,7 +239,7 @@ def _document(
         "orientation": planned.orientation.tolist(),
         "figures": asdict(planned.figures),
         "optimal": planned.optimal,
-        "joins": [{"label": labels[id(join)], **asdict(join)} for join in planned.operations],
+        "joins": [{"label": labels[id(join)], **asdict(join)} for join in joins],
         "approaches": matings.as_json() if matings else None,
         "files": [str(path) for path in files],
         "warnings": warnings,
@@ -256,16 +267,18 @@ def _by_label(placed: InPlace, planned: Planned, project: Project) -> dict[str, 
 def _print(placed: InPlace, planned: Planned, project: Project, out: OutputOptions) -> None:
     """Print the plan, before its pictures are drawn: these take longer than most plans do."""
     parts = sum(1 for _ in project.pag.parts())
-    matings = project.matings
+    figures = planned.figures
+    matings = project.matings if figures.layouts else None
     operations = len(matings.all) if matings else len(project.pag) - parts
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     ways += _for_hulls(planned.hidden)
-    say(f"{project.file}: {parts} parts, {operations} operations; ways: {ways}")
-    figures = planned.figures
+    by_kind = f"; ways: {ways}" if ways else ""
+    say(f"{project.file}: {parts} parts, {operations} operations{by_kind}")
     for note in planned.notes:
         say(note)
     best = "optimal by estimate" if planned.optimal else "the best found"
+    best = best if figures.layouts else UNLAID
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
