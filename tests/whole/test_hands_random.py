@@ -22,6 +22,7 @@ from factory.pipeline import Project, read
 from factory.support.errors import RunError
 from factory.support.settings import LEAST
 from factory.theory.problem.plan import Plan
+from tests.drawn_products import drawn_product
 from tests.random_products import random_blocks, random_product
 
 AT_MOST_MM, GRIP_MM = 0.1, 0.5
@@ -236,3 +237,10 @@ def test_a_tool_may_be_farther_than_its_goal_when_an_operation_begins(tmp_path: 
     search looks at were refused as NotPrepared, and with them the product."""
     project = project_of(random_product(2611330026), tmp_path)
     succeeds(allocated(project, Aim(LEAST, effort=12)), 2611330026, 2, 0.3)
+
+
+def test_what_is_lowered_passes_the_beam_over_a_part_of_a_feeder(tmp_path: Path) -> None:
+    """Its mast stands beside the part, so the beam reaches to there: the layout was refused."""
+    project = read(drawn_product(291310070).write(tmp_path))
+    run = Simulation(project.layout, RunRequest(units=1, jitter=0.3)).run()
+    assert run.verdict.succeeded

@@ -15,13 +15,13 @@ from factory.floor.layout.dimensions import SLOT
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.hand import Hand, Kind
 from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.lowered import Lowered
 from factory.floor.layout.hands.places import SMALL, Places
 from factory.floor.layout.hands.reach import back, halves, reach, under_beam
 from factory.floor.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.floor.layout.hands.tips import STRONG
 from factory.floor.layout.presence import ACROSS, ALONG
 from factory.support.arrays import Array, Truth
-from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 
 IN_THE_WAY = {
@@ -69,6 +69,7 @@ class InTheWay:
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
+        self.lowered = Lowered(holding, self.apart)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
         self._passed: dict[tuple[object, ...], Passed] = {}
         self._onward: dict[int, Array] = {}
@@ -124,6 +125,7 @@ class InTheWay:
             free["hands"] &= self.apart.own_side(robot, kind, places, u, t)
             free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, places, u, t), places)
             free["joined"] &= ~_any(self._raised(robot, kind, places, u, t), places)
+            free["lowered"] &= ~_any(self.lowered.beams(robot, kind, places, u, t), places)
         free["hands"] &= self.apart.over_fingers(kind, places)
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
         passing = [self._passing(robot, label, kind, places, u, t) for u, t in headings]
@@ -163,7 +165,7 @@ class InTheWay:
         return Passed(
             _any(self.coming(robot, label, kind, places, u, t), places),
             _any(self._leaving(robot, kind, places, u), places),
-            _any(self._lowered(robot, kind, places, u), places),
+            _any(self.lowered.onto(robot, kind, places, u), places),
             _any((ways for later, ways in joined if not later), places),
             _any((ways for later, ways in joined if later), places),
         )
@@ -179,7 +181,10 @@ class InTheWay:
             yield "joined", ways
         for ways in self.apart.carriers_hand(robot, kind, places, u, t):
             yield "hands", ways
-        for ways in self._lowered(robot, kind, places, u):
+        for ways in (
+            *self.lowered.onto(robot, kind, places, u),
+            *self.lowered.beams(robot, kind, places, u, t),
+        ):
             yield "lowered", ways
 
     def reach(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
@@ -228,7 +233,7 @@ class InTheWay:
                 yield (*swept(low, high, back(u)), self.holding.boxes(whole))
             return
         broad = under_beam(kind, low, high, places.radius)
-        for boxes in self._from_above(last, robot, (u,)):
+        for boxes in self.lowered.boxes(last, robot, (u,)):
             yield (*swept(*broad, back(u)), boxes)
         lifted = self.holding.factory.goes_up(robot)
         gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
@@ -276,7 +281,7 @@ class InTheWay:
             then = made[made.index(last) + 1 :][:1] if last in made else ()
             boxes = [self.holding.boxes(last.label)]
             for o in then:
-                above = self._from_above(o, last.carrier, ())
+                above = self.lowered.boxes(o, last.carrier, ())
                 boxes = [self.holding.surfaces.boxes(factory.contents[o.label]), *above]
             self._onward[last.index] = np.concatenate(boxes)
         return self._onward[last.index]
@@ -318,30 +323,6 @@ class InTheWay:
                     parts = self.holding.boxes(label)
                     for side in (t, back(t)):
                         yield later, (*swept(low if later else rising, high, side), parts)
-
-    def _lowered(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
-        """The sweep of a hand relative to each input that is lowered to a carrier."""
-        low, high = under_beam(kind, *self.reach(kind, places, u), places.radius)
-        if kind != "below":
-            low, high = swept(low, high, back(u))
-        for operation in self.holding.made(robot):
-            for boxes in self._from_above(operation, robot, [(u[1], u[0]), (-u[1], -u[0])]):
-                yield low, high, boxes
-
-    def _from_above(
-        self, operation: Operation, robot: int, sides: Sequence[Way]
-    ) -> Iterator[Array]:
-        """The boxes (n, 2, 3) of what is lowered to a robot in an operation: on the way down, and
-        before that as it comes from some sides over everything that stands there."""
-        slot = operation.lowered
-        if slot < 0 or operation.robots[slot] == robot:
-            return
-        boxes = self.holding.boxes(operation.before[slot]).copy()
-        boxes[:, 1, 2] = np.inf
-        yield boxes.copy()
-        boxes[:, 0, 2] += self.holding.factory.lowering(operation.robots[slot])
-        for side in sides:
-            yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
 
 
 def _any(sweeps: Iterable[Swept], places: Places) -> Truth:
