@@ -365,7 +365,7 @@ def test_what_has_not_settled_is_left_out_of_contact_too(monkeypatch: pytest.Mon
             monkeypatch.setattr("factory.engine.simulation.mujoco.parts.SETTLING", np.inf)
         run = Simulation(layout, RunRequest(units=2, fuse=True)).run()
         assert run.products == 2 and run.physics and run.physics.excluded == (("b", "c"),)
-        assert run.physics.unintended_contacts == 0 and run.physics.mating_force_max_n == 0
+        assert run.physics.unintended_contacts == 0 and not run.physics.mating_forces.get("s2")
 
 
 def test_a_misfit_is_part_of_the_error(monkeypatch: pytest.MonkeyPatch) -> None:

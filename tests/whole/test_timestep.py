@@ -42,8 +42,8 @@ from tests.simulation_values import layout_of
 
 layout = cache(layout_of)
 
-SHORTEST_OF_LAMP = 0.04
-"""Length of the holder, the shortest part of examples/lamp.pag [m]."""
+SMALLEST_OF_LAMP = 0.064745656
+"""Diagonal of the holder, the smallest part of examples/lamp.pag [m]."""
 
 LIMITS = ("tracking_error_max_mm", "handoff_gap_max_mm", "weld_residual_max_mm")
 """The figures that a timestep is chosen by."""
@@ -203,7 +203,7 @@ def test_it_is_the_longest_that_is_good(
 
     def good(one: Settings) -> bool:
         fastest = max(speed * (1 + jitter), settings.outfeed)
-        still = timestep._impact(one, SHORTEST_OF_LAMP) < timestep.TURNED
+        still = timestep._impact(one, SMALLEST_OF_LAMP) < timestep.TURNED
         axes = tuple(timestep._axes(settings, floor, jitter))
         return fastest * one.step < clearance and still and timestep._good(one, axes)
 

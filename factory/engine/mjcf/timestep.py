@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import radians
 
+import numpy as np
+
 from factory.engine.mjcf.driving import (
     ALLOWED,
     GRAVITY,
@@ -38,9 +40,9 @@ DIP, DEEPEST = 1.9e-5, 2.5e-4
 each m/s² of the slider, in timesteps of a tick, measured; and it may be so far: a pad then presses
 on it by half as much as it may."""
 
-IMPACT, LEFT, TURNED = 0.45, 0.53, radians(0.1)
+IMPACT, LEFT, TURNED = 0.46, 0.53, radians(0.1)
 """A part that meets another beside its middle is turned by at most IMPACT × a h² over half its
-length; of that a weld leaves the share LEFT in each timestep of the tick until it changes hands,
+diagonal; of that a weld leaves the share LEFT in each timestep of the tick until it changes hands,
 turned by at most TURNED [rad] (docs/decisions/timestep.md)."""
 
 CRUISES = 0.7
@@ -58,8 +60,8 @@ def timed(
     it that the clearance allows, where none does that."""
     if settings.timestep != AUTO:
         return replace(settings, substeps=settings.steps)
-    least = settings.substeps or 1
-    counts = [n for n in STEPS if n >= least] or [least]
+    lowest = settings.substeps or 1
+    counts = [n for n in STEPS if n >= lowest] or [lowest]
     candidates = [replace(settings, timestep=TICK / n, substeps=n) for n in counts]
     if world == "ideal":
         return _usual(candidates)
@@ -70,8 +72,8 @@ def timed(
     candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]
     solids = [layout.product.solids[o.label] for o in layout.factory.leaves]
     fed = max(solid.mass for solid in solids) if any(layout.hands) else 0.0
-    shortest = min(float(max(solid.high - solid.low)) for solid in solids)
-    calm = (s for s in candidates if _dip(s, fed) < DEEPEST and _impact(s, shortest) < TURNED)
+    least = min(float(np.linalg.norm(solid.high - solid.low)) for solid in solids)
+    calm = (s for s in candidates if _dip(s, fed) < DEEPEST and _impact(s, least) < TURNED)
     return next((s for s in calm if _good(s, axes)), _usual(candidates))
 
 
@@ -97,9 +99,10 @@ def _dip(settings: Settings, load: float) -> float:
     return DIP * load * settings.feeder_limits[1] * (settings.step / TICK) ** 3
 
 
-def _impact(settings: Settings, length: float) -> float:
-    """How far a part of a length is turned [rad] where it changes hands after it met another."""
-    turned = IMPACT * settings.acceleration * settings.step**2 / (length / 2)
+def _impact(settings: Settings, across: float) -> float:
+    """How far a part of a diagonal [m] is turned [rad] where it changes hands after it met
+    another."""
+    turned = IMPACT * settings.acceleration * settings.step**2 / (across / 2)
     return turned * float(LEFT ** (TICK / settings.step))
 
 
