@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import factory
-from factory.floor.layout.hands.misses import NoGrip
+from factory.floor.layout.hands.in_the_way import IN_THE_WAY
+from factory.floor.layout.hands.misses import THERE, NoGrip
 from factory.floor.layout.hands.tips import STRONG
 from factory.pipeline import read
 from tests.command_line import Terminal
@@ -202,3 +203,7 @@ def test_robots_have_a_hand_unless_it_is_told_before(seed: int, tmp_path: Path) 
         if (hand := layout.hand(robot.index)) is not None and hand.kind == "none"
     }
     assert lacking == {no_grip.robot for no_grip in project.no_grips}
+
+
+def test_every_obstacle_of_a_hand_has_words() -> None:
+    assert {*THERE} == {*IN_THE_WAY}

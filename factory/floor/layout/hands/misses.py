@@ -20,6 +20,7 @@ THERE = {
     "own": "its own",
     "hands": "a hand beside it",
     "feeder": "its feeder's pad",
+    "tray": "the outfeed's tray",
     "weak": "its weight, for which it is too far from its middle",
 }
 """Why something is in the way of a hand, in few words."""
