@@ -293,9 +293,8 @@ def steady_units(timing: Timing) -> int:
 
     Robots before the bottleneck fill first; until then products come at the pace of other robots.
     """
-    net = timed_net(timing)
-    dates = leaving_dates(timing, net.firings(MOST))[:MOST]
-    return reached(dates, net.pace, net.units)
+    net = timed(timing)
+    return reached(np.array(net.departures(MOST)), net.pace, timing.factory.period)
 
 
 def reached(dates: Array, pace: float, period: int = 1) -> int:

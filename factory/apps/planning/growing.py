@@ -32,6 +32,7 @@ from factory.apps.planning.subsets import (
     TIPS,
     subsets,
 )
+from factory.apps.planning.writing import leaves
 
 Sets = NDArray[np.bool_]
 
@@ -282,6 +283,4 @@ def _groups(node: Tree, axis: int, random: np.random.Generator) -> tuple[Joined,
 
 def units_of(tree: Tree) -> Units:
     """The units of a tree, ascending."""
-    if isinstance(tree, int):
-        return (tree,)
-    return tuple(sorted(unit for below in tree for unit in units_of(below)))
+    return tuple(sorted(leaves(tree)))

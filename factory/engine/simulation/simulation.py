@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from factory.engine.mjcf.model import Model
     from factory.engine.simulation.mujoco.world import MujocoWorld
 
-STEADY, SETTLED = 0.01, 100
-"""Intervals are those of the long run if they differ by less than this share of it; after so many
-products all are."""
+AGREES, SETTLED = 0.01, 100
+"""A mean interval is that of the long run if it differs by less than this share of it; after so
+many products it is."""
 
 PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
@@ -325,11 +325,11 @@ class Simulation:
         measured = mean_interval(left, period)
         if measured is None or self.request.demand or self.supervisor.scans:
             return False
-        if len(left) > SETTLED or abs(measured / pace - 1) < STEADY:
+        if len(left) > SETTLED or abs(measured / pace - 1) < AGREES:
             return False
         net = timed_net(self.timing, wip=wip)
         foretold = mean_interval(net.departures(len(left)), period)
-        return foretold is not None and abs(foretold / pace - 1) >= STEADY
+        return foretold is not None and abs(foretold / pace - 1) >= AGREES
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
         """Names the order that has not been placed, the robots that are in an operation, or else

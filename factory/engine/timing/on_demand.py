@@ -46,7 +46,7 @@ class WordTimes:
     def dropoffs(self) -> list[float]:
         """When each unit is dropped off [s]."""
         factory, net, word = self.timed.timing.factory, self.timed.net, self.word
-        begun, ready = self._beginning, self.timed.ready
+        begun, ready = self.timed.timing.first, self.timed.ready
         served = self.timed.timing.coordinated.served.values()
         first = {o.start for o in factory.leaves} | {net.right[one.top] for one in served}
         ends = {o.end for o in factory.dropoffs}
@@ -60,9 +60,9 @@ class WordTimes:
                 for place in net.net.preset[event]:
                     before = net.left[place], period - net.tokens[place]
                     if before in dates:
-                        times = self.timed.seconds if period else begun
-                        seconds = times[place] if self._takes(before) else 0.0
-                        date = max(date, dates[before] + seconds)
+                        usual = self.timed.seconds[place]
+                        seconds = usual if period else begun.get(place, usual)
+                        date = max(date, dates[before] + seconds * self._takes(before))
                     elif word.is_made(unit):
                         date = max(date, ready.get(place, 0.0))
                 number = word.number(unit)
@@ -93,14 +93,6 @@ class WordTimes:
         """The mean interval between the units of the last half, and the bottleneck."""
         last = self.dropoffs[len(self.dropoffs) // 2 - 1 :] if len(self.dropoffs) > 1 else [0.0]
         return CycleTime((last[-1] - last[0]) / max(1, len(last) - 1), self.bottleneck)
-
-    @cached_property
-    def _beginning(self) -> list[float]:
-        """The time in each place in the first period [s]: robots stand at their B ends then."""
-        timing, seconds = self.timed.timing, [*self.timed.seconds]
-        for number, taken in timing.first.items():
-            seconds[timing.factory.operations[number].place] = taken
-        return seconds
 
     @cached_property
     def _lasting(self) -> dict[int, str]:
