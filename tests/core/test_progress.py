@@ -7,10 +7,11 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from functools import partial
 from itertools import count
 from pathlib import Path
-from threading import Barrier, get_ident
+from threading import Barrier, Event, get_ident
 from types import SimpleNamespace
 
 import pytest
@@ -136,6 +137,29 @@ def test_works_are_done_side_by_side_and_given_in_order(monkeypatch: pytest.Monk
     assert [number for number, _ in found] == [1, 2, 3]
     assert len({thread for _, thread in found}) == 2
     assert side_by_side([]) == []
+
+
+def test_no_work_is_begun_after_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is under way ends by itself."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    others, both, stopped, begun = {*threading.enumerate()}, Barrier(3), Event(), list[int]()
+
+    def work(number: int) -> None:
+        begun.append(number)
+        both.wait(60)
+        stopped.wait(60)
+
+    def stop(*_: int) -> None:
+        both.wait(60)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        side_by_side([partial(work, number) for number in range(9)], stop)
+    ours = {*threading.enumerate()} - others
+    stopped.set()
+    for thread in ours:
+        thread.join(60)
+    assert sorted(begun) == [0, 1]
 
 
 STOPPED = """

@@ -31,7 +31,7 @@ from factory.theory.problem.plan import THIRD, Plan
 from tests.random_products import random_product
 from tests.state_space import explored
 
-FEW, MANY = (4, 8, 10, 16, 691), (7, *range(100, 1100))
+FEW, MANY = (4, 8, 10, 16, 101, 691), (7, *range(100, 1100))
 """Seeds: the few have forms, robots with several tours, and branches that are there twice."""
 
 
