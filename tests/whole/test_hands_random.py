@@ -18,6 +18,7 @@ from factory.floor.layout.certificate import fault
 from factory.floor.layout.dimensions import TOOL_TRAVEL
 from factory.floor.layout.embedding import certified
 from factory.floor.layout.shapes import is_tool
+from factory.floor.modes.modes import operation_modes
 from factory.pipeline import Project, read
 from factory.support.errors import RunError
 from factory.support.settings import LEAST
@@ -237,6 +238,12 @@ def test_a_tool_may_be_farther_than_its_goal_when_an_operation_begins(tmp_path: 
     search looks at were refused as NotPrepared, and with them the product."""
     project = project_of(random_product(2611330026), tmp_path)
     succeeds(allocated(project, Aim(LEAST, effort=12)), 2611330026, 2, 0.3)
+
+
+def test_a_candidate_in_which_an_operation_cannot_begin_is_left_out(tmp_path: Path) -> None:
+    """The search for least robots ended in its NotPrepared."""
+    project = allocated(project_of(random_product(291430003), tmp_path), Aim(LEAST))
+    assert operation_modes(project.layout, project.settings.eps) and len(project.planned.robots) == 8
 
 
 def test_what_is_lowered_passes_the_beam_over_a_part_of_a_feeder(tmp_path: Path) -> None:

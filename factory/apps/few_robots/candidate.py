@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from math import inf
 
 from factory.api import FactoryError, Project, Timing, pace
 from factory.apps.few_robots.bundles import Filling
@@ -76,16 +77,19 @@ class Candidate:
 
     @property
     def least(self) -> float:
-        """Lower bound on its cycle time: that of its draft, in which no hand waits for another
-        [s]."""
-        timing = Timing(self.project.draft, self.project.settings)
-        return cycle_time(timing.factory, timing.delays, timing.ways()).seconds
+        """Lower bound on its cycle time: that of its draft, in which no hand waits for another;
+        infinite where there is no draft, or an operation cannot begin [s]."""
+        try:
+            timing = Timing(self.project.draft, self.project.settings)
+            return cycle_time(timing.factory, timing.delays, timing.ways()).seconds
+        except FactoryError:
+            return inf
 
     @cached_property
     def has_layout(self) -> bool:
-        """Whether it has a layout."""
+        """Whether it has a layout in which all its operations can begin."""
         try:
-            return bool(self.project.layout)
+            return self.seconds > 0
         except FactoryError:
             return False
 
