@@ -22,8 +22,11 @@ ROOT = Path(__file__).resolve().parent.parent
 
 DOCS = ROOT / "docs"
 
-PHYSICS = ("factory/floor/layout", "factory/engine/mjcf", "factory/engine/simulation", "mjcf")
-"""The folders on which what is measured depends."""
+ORACLE = ROOT / "benches" / "oracle.json"
+"""Hashes of what commands give, kept by `benches.oracle`."""
+
+PHYSICAL = ("mujoco", "jitter", "faults")
+"""Last words of the oracle's cases that run in MuJoCo."""
 
 
 @dataclass(frozen=True)
@@ -131,20 +134,21 @@ class Report:
         }
 
 
-OLD = (
-    f"**Out of date** ({', '.join(PHYSICS[:-1])} or {PHYSICS[-1]} has changed since they were"
-    " measured): {}."
-)
+OLD = "**Out of date** (models or runs of the examples have changed since they were measured): {}."
 
 
-def physics(root: Path = ROOT) -> str:
-    """A digest of all files of PHYSICS: it needs no history of commits."""
-    found = hashlib.sha256()
-    for folder in PHYSICS:
-        for file in sorted((root / folder).rglob("*")):
-            if file.suffix in (".py", ".xml", ".toml"):
-                found.update(f"{file.relative_to(root).as_posix()}\n".encode() + file.read_bytes())
-    return found.hexdigest()[:16]
+def physics(oracle: Path = ORACLE) -> str:
+    """A digest of the models and of the runs of the examples in MuJoCo.
+
+    It is that of their hashes in the oracle, so it changes with what runs do and not with how the
+    code is written.
+    """
+    kept = json.loads(oracle.read_text())
+    models = [
+        files[file] for files in kept.values() for file in sorted(files) if file.endswith(".xml")
+    ]
+    runs = [files["printed"] for name, files in kept.items() if name.endswith(PHYSICAL)]
+    return hashlib.sha256("\n".join([*models, *runs]).encode()).hexdigest()[:16]
 
 
 def _commit() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -96,14 +95,23 @@ def test_a_report_says_which_sections_are_older_than_the_physics(
     assert "Proofs against" in report.text().split("## ")[0] and report.text() != text
 
 
-def test_a_digest_of_the_physics_is_of_all_its_files(tmp_path: Path) -> None:
-    for folder in reporting.PHYSICS:
-        shutil.copytree(reporting.ROOT / folder, tmp_path / folder)
-    assert reporting.physics(tmp_path) == reporting.physics()
-    for changed in ("mjcf/dot.xml", "factory/floor/layout/hands/limbs.py"):
-        before = reporting.physics(tmp_path)
-        (tmp_path / changed).write_text((tmp_path / changed).read_text() + "\n")
-        assert reporting.physics(tmp_path) != before
+@pytest.mark.parametrize(
+    ("case", "file", "of_it"),
+    [
+        ("build lamp", "out/lamp.xml", True),
+        ("run stool mujoco", "printed", True),
+        ("jitter", "printed", True),
+        ("check lamp", "printed", False),
+        ("run stool ideal", "printed", False),
+    ],
+)
+def test_a_digest_of_the_physics_is_of_models_and_runs(
+    tmp_path: Path, case: str, file: str, of_it: bool
+) -> None:
+    kept = json.loads(reporting.ORACLE.read_text())
+    kept[case][file] = "another"
+    (tmp_path / "oracle.json").write_text(json.dumps(kept))
+    assert (reporting.physics(tmp_path / "oracle.json") != reporting.physics()) == of_it
 
 
 @pytest.mark.parametrize("units", [None, 2])
