@@ -243,7 +243,9 @@ def test_a_tool_may_be_farther_than_its_goal_when_an_operation_begins(tmp_path: 
 def test_a_candidate_in_which_an_operation_cannot_begin_is_left_out(tmp_path: Path) -> None:
     """The search for least robots ended in its NotPrepared."""
     project = allocated(project_of(random_product(291430003), tmp_path), Aim(LEAST))
-    assert operation_modes(project.layout, project.settings.eps) and len(project.planned.robots) == 8
+    assert (
+        operation_modes(project.layout, project.settings.eps) and len(project.planned.robots) == 8
+    )
 
 
 def test_what_is_lowered_passes_the_beam_over_a_part_of_a_feeder(tmp_path: Path) -> None:
