@@ -1,0 +1,284 @@
+"""Legs: ways of an arm from one visit to the next, and the configurations of visits round a circuit.
+
+A leg leaves a visit along a straight line, crosses clear of everything that stands, and comes to
+the next visit along a straight line. It crosses along the straight joint line where that is clear,
+else along one found by RRT-connect (Kuffner, LaValle 2000) and shortened.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.api import Array, Index, Truth
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.inverse import (
+    SINGULAR,
+    descend,
+    in_range,
+    least_singular_value,
+)
+from factory.apps.arms.joint_way import JointWay, WayLimits
+from factory.apps.arms.slowness import way_through
+
+Clearance = Callable[[Array], tuple[Array, Index]]
+"""From configurations (m, n) to their margins (m,), the distance to what is nearest less the
+clearance that it needs [m], and the number of the nearest pair (m,)."""
+
+SPACING = 0.04
+"""Between configurations of a polyline that are asked for their clearance [rad, m]."""
+
+RESERVE = 0.006
+"""Margin of a transfer's polyline: it is rounded afterwards, and more is between its samples
+[m]."""
+
+REACH, BEYOND = 0.36, 0.7
+"""How far a tree grows at once, and how far beyond the two ends it may go [rad, m]."""
+
+ROUNDS, SHORTCUTS = 4000, 60
+
+ROUNDINGS = 0.1, 0.05, 0.025, 0.0125
+"""Half widths of the average that rounds corners, tried in turn [s at the joints' full speed]."""
+
+CHECKS = 150
+"""Number of configurations of a way that are asked for their clearance."""
+
+CROSSING = 0.02
+"""Along the joint line within a branch no least singular value is below this."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoWay:
+    """Why there is no leg between two visits.
+
+    Attributes:
+        pair: number of the pair that was nearest in most configurations that were not clear.
+        depth: greatest violation of its clearance [m].
+        count: number of configurations that were not clear.
+    """
+
+    pair: int
+    depth: float
+    count: int
+
+
+class _Search:
+    """The search for a transfer: what is clear, and what was not."""
+
+    def __init__(self, clearance: Clearance, reserve: float) -> None:
+        self.clearance, self.reserve = clearance, reserve
+        self.pairs: dict[int, list[float]] = {}
+
+    def clear(self, a: Array, b: Array) -> bool:
+        """Whether the straight joint line between two configurations is clear."""
+        margin, pair = self.clearance(line(a, b))
+        bad = margin < self.reserve
+        for number, depth in zip(pair[bad].tolist(), margin[bad].tolist(), strict=True):
+            self.pairs.setdefault(number, []).append(self.reserve - depth)
+        return not bad.any()
+
+    def no_way(self) -> NoWay:
+        pair = max(sorted(self.pairs), key=lambda number: len(self.pairs[number]))
+        return NoWay(pair, max(self.pairs[pair]), sum(map(len, self.pairs.values())))
+
+    def shortened(self, path: list[Array], rng: np.random.Generator) -> list[Array]:
+        """A polyline with shortcuts at random."""
+        for _ in range(SHORTCUTS):
+            if len(path) < 3:
+                break
+            i, j = sorted(rng.choice(len(path), 2, replace=False).tolist())
+            if j - i > 1 and self.clear(path[i], path[j]):
+                path = path[: i + 1] + path[j:]
+        return path
+
+
+def line(a: Array, b: Array) -> Array:
+    """Configurations (k, n) on the straight joint line between two, at most SPACING apart.
+
+    Args:
+        a: the first (n,) [rad, m].
+        b: the last (n,) [rad, m].
+    """
+    count = max(2, int(np.ceil(np.abs(b - a).max() / SPACING)) + 1)
+    return np.asarray(a + np.linspace(0.0, 1.0, count)[:, None] * (b - a))
+
+
+def transfer(
+    a: Array,
+    b: Array,
+    clearance: Clearance,
+    limits: tuple[Array, Array],
+    seed: int = 0,
+    rounds: int = ROUNDS,
+    reserve: float = RESERVE,
+) -> Array | NoWay:
+    """A clear polyline (k, n) in joint space [rad, m], or why none was seen.
+
+    Args:
+        a: its beginning (n,) [rad, m].
+        b: its end (n,) [rad, m].
+        clearance: of configurations.
+        limits: least and greatest joint positions (n,) [rad, m].
+        seed: of the random search.
+        rounds: how often the trees grow.
+        reserve: least margin [m].
+    """
+    search, rng = _Search(clearance, reserve), np.random.default_rng(seed)
+    if search.clear(a, b):
+        return line(a, b)
+    ends = clearance(np.stack([a, b]))[0] >= reserve
+    path = _connected(a, b, search, limits, rng, rounds) if ends.all() else None
+    if path is None:
+        return search.no_way()
+    path = search.shortened(path, rng)
+    rows = [line(p, q)[1:] for p, q in zip(path, path[1:], strict=False)]
+    return np.concatenate([a[None], *rows])
+
+
+def _connected(
+    a: Array,
+    b: Array,
+    search: _Search,
+    limits: tuple[Array, Array],
+    rng: np.random.Generator,
+    rounds: int,
+) -> list[Array] | None:
+    """Corners of a clear polyline, by two trees that grow from its ends towards each other."""
+    low = np.maximum(np.minimum(a, b) - BEYOND, limits[0])
+    high = np.minimum(np.maximum(a, b) + BEYOND, limits[1])
+    trees = ([a], [-1]), ([b], [-1])
+    for number in range(rounds):
+        (nodes, parents), (others, back) = trees[number % 2], trees[1 - number % 2]
+        aim = rng.uniform(low, high)
+        near = _nearest(nodes, aim)
+        off = aim - nodes[near]
+        grown = nodes[near] + off * min(1.0, REACH / float(np.abs(off).max()))
+        if not search.clear(nodes[near], grown):
+            continue
+        nodes.append(grown)
+        parents.append(near)
+        meeting = _nearest(others, grown)
+        if search.clear(grown, others[meeting]):
+            one, two = _trace(nodes, parents, len(nodes) - 1), _trace(others, back, meeting)
+            return one[::-1] + two if number % 2 == 0 else two[::-1] + one
+    return None
+
+
+def _nearest(nodes: Sequence[Array], q: Array) -> int:
+    return int(np.abs(np.array(nodes) - q).max(axis=1).argmin())
+
+
+def _trace(nodes: Sequence[Array], parents: Sequence[int], node: int) -> list[Array]:
+    """The nodes from one to the root of its tree."""
+    path = []
+    while node >= 0:
+        path.append(nodes[node])
+        node = parents[node]
+    return path
+
+
+def leg(
+    chain: SerialChain,
+    out: Array,
+    into: Array,
+    clearance: Clearance,
+    ends: Clearance,
+    pace: WayLimits = WayLimits(),
+    seed: int = 0,
+) -> JointWay | NoWay:
+    """The way from one visit to the next, or why there is none.
+
+    Args:
+        chain: the arm.
+        out: configurations along the straight beginning, from the visit (k, n) [rad, m].
+        into: configurations along the straight end, to the visit (k, n) [rad, m].
+        clearance: of configurations on the transfer.
+        ends: of configurations on the straight beginning and end.
+        pace: limits of the coordinate and the tool.
+        seed: of the random search.
+    """
+    limits = chain.limits.low, chain.limits.high
+    middle = transfer(out[-1], into[0], clearance, limits, seed)
+    if isinstance(middle, NoWay):
+        return middle
+    blocked: NoWay | None = None
+    for rounding in ROUNDINGS:
+        way = way_through(chain, out, middle, into, pace, rounding=rounding)
+        blocked = obstruction(way, clearance, ends)
+        if blocked is None:
+            return way
+    assert blocked
+    return blocked
+
+
+def obstruction(way: JointWay, clearance: Clearance, ends: Clearance) -> NoWay | None:
+    """What a way comes nearer to than it may, at equal distances along it; None if nothing.
+
+    Args:
+        way: to be followed.
+        clearance: of configurations on the transfer.
+        ends: of configurations on the straight beginning and end.
+    """
+    x = np.linspace(0.0, way.length, CHECKS)
+    q = way.at(x)[0]
+    inside = (way.off <= x) & (x <= way.hover)
+    margin, pair = np.empty(CHECKS), np.empty(CHECKS, int)
+    for part, asked in ((inside, clearance), (~inside, ends)):
+        margin[part], pair[part] = asked(q[part])
+    if margin.min() >= 0.0:
+        return None
+    return NoWay(int(pair[margin.argmin()]), -float(margin.min()), int((margin < 0.0).sum()))
+
+
+def partners(chain: SerialChain, q: Array, place: Array, turn: Array) -> tuple[Array, Truth]:
+    """The configurations (k, n) that bring the tool to a second pose on the branch of those that
+    have it at a first one, and whether there is one (k,): both, and the joint line between them,
+    stay away from singular configurations.
+
+    Args:
+        chain: the arm.
+        q: configurations at the first pose (k, n) [rad, m].
+        place: of the tool at the second pose (3,) or (k, 3) [m].
+        turn: orientation of the tool there (3, 3) or (k, 3, 3).
+    """
+    other, there = descend(chain, place, turn, q, 80)
+    other, inside = in_range(chain, other, q)
+    share = np.linspace(0.0, 1.0, 9)[:, None, None]
+    values = least_singular_value(chain, q + share * (other - q))
+    good = there & inside & (np.minimum(values[0], values[-1]) >= SINGULAR)
+    return other, good & (values.min(axis=0) >= CROSSING)
+
+
+def circuit(options: Sequence[Array], speed: Array) -> list[int]:
+    """Which configurations to use for each tour of a circuit: those of least total time, by dynamic
+    programming. A leg costs the time of its slowest joint, and a twentieth of that of all.
+
+    Args:
+        options: for each tour in turn, pairs of configurations where it takes its part and where it
+            places it (k, 2, n), at least one [rad, m].
+        speed: greatest speed of the joints (n,) [rad/s, m/s].
+    """
+
+    def cost(a: Array, b: Array) -> Array:
+        time = np.abs(b - a) / speed
+        return np.asarray(time.max(axis=-1) + 0.05 * time.sum(axis=-1))
+
+    brings = [cost(pairs[:, 0], pairs[:, 1]) for pairs in options]
+    goes = [
+        cost(one[:, None, 1], other[None, :, 0])
+        for one, other in zip(options, [*options[1:], options[0]], strict=True)
+    ]
+    total = np.where(np.eye(len(options[0]), dtype=bool), brings[0], np.inf)
+    before: list[Index] = []
+    for way, load in zip(goes[:-1], brings[1:], strict=True):
+        every = total[:, :, None] + way
+        before.append(every.argmin(axis=1))
+        total = every.min(axis=1) + load
+    total += goes[-1].T
+    first, last = np.unravel_index(int(total.argmin()), total.shape)
+    chosen = [int(last)]
+    for back in reversed(before):
+        chosen.append(int(back[first, chosen[-1]]))
+    return chosen[::-1]
