@@ -203,7 +203,9 @@ class Unreachable:
             arm: the name of the arm.
         """
         if self.singular is not None:
-            return f"'{part}' is reached by {arm} only within {SINGULAR:g} of a singular configuration"
+            return (
+                f"'{part}' is reached by {arm} only within {SINGULAR:g} of a singular configuration"
+            )
         where = f"'{part}' is {self.distance:.3f} m from the axis of {arm}"
         where += f", at {self.height:.2f} m above its base"
         if self.reach is None:
@@ -297,4 +299,3 @@ def away(chain: SerialChain, q: Array) -> Array:
         q: configurations (..., n) [rad, m].
     """
     return -chain.tool(q)[1][..., :, 2]
-

@@ -240,9 +240,7 @@ class _Reading:
         middle = weight @ at / total if abs(total) > 1e-12 else np.zeros(3)
         return float(mass.sum()), center, moment, total, middle
 
-    def _bodies(
-        self, frames: Sequence[int], place: Array, turn: Array
-    ) -> list[ConvexBody]:
+    def _bodies(self, frames: Sequence[int], place: Array, turn: Array) -> list[ConvexBody]:
         """The convex bodies of what can touch; of all geoms of the arm, if none can."""
         m = self.m
         endless = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -290,5 +288,3 @@ def _hull(m: mujoco.MjModel, mesh: int) -> Array:
     count = int(m.mesh_graph[graph])
     corners = m.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]
     return np.asarray(vertices[corners])
-
-

@@ -28,7 +28,7 @@ def goals(model: Model) -> Json:
         for axis, goal in zip(axes, modes[operation.index].goals.tolist(), strict=True):
             if axis in layout.curves[0]:
                 at = layout.guidepaths[axis].framed(goal, goal)[0][0].tolist()
-                moved = names.moved_along(robots[axis].name)
+                moved = names.moved_along(robots[axis])
                 for (joint, actuator), place in zip(moved, at, strict=True):
                     yield actuator, scales[joint].at(place)
             else:

@@ -79,7 +79,7 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
     }
     for robot in layout.curves[0]:
         back, *further = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
-        (first, _), *others = names.moved_along(layout.factory.robots[robot].name)
+        (first, _), *others = names.moved_along(layout.factory.robots[robot])
         scales[first] = Scale(back, -1.0)
         scales |= {joint: Scale(x) for (joint, _), x in zip(others, further, strict=True)}
     return scales

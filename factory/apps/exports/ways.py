@@ -62,7 +62,7 @@ class _Writer:
             axes = [factory.axes[axis] for axis in factory.axes_of(one.robot)]
             joints = [names.joint(axis) for axis in axes]
             if one.bodies.bent is not None:
-                joints[:1] = [joint for joint, _ in names.moved_along(robot)]
+                joints[:1] = [joint for joint, _ in names.along_bends(robot)]
             chain = map(names.moved, factory.chain(one.robot))
             bodies = [*dict.fromkeys([names.carriage(robot), *chain])]
             scales = [self._scales[joint] for joint in joints]

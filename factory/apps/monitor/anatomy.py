@@ -45,7 +45,7 @@ class BentWays:
     def of(cls, m: Any, called: list[str], bent: Bent) -> BentWays:
         """Those of robots `called` in a model. Raises KeyError where it lacks them."""
         robots, ways = bent
-        moved = [pair for robot in robots for pair in names.moved_along(called[robot])]
+        moved = [pair for robot in robots for pair in names.along_bends(called[robot])]
         joints = np.array([m.joint(joint).id for joint, _ in moved], np.intp).reshape(-1, 2)
         drives = np.array([m.actuator(drive).id for _, drive in moved], np.intp).reshape(-1, 2)
         return cls(
@@ -58,7 +58,8 @@ class BentWays:
 
     def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Their arc lengths [m] and speeds [m/s]."""
-        return self.ways.along(qpos[self.slides], qvel[self.dofs])
+        every = np.arange(len(self.robots))
+        return self.ways.along(every, qpos[self.slides], qvel[self.dofs], np.zeros(len(every)))
 
     def reached(self, ctrl: Array) -> Array:
         """The arc lengths [m] of their setpoints."""

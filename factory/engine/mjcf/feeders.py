@@ -15,7 +15,7 @@ from factory.engine.mjcf.robots import MOTOR, Drive, add_drive, heading_quaterni
 from factory.engine.mjcf.stops import stops_of
 from factory.floor.geometry.suction import PadPlace
 from factory.floor.layout.dimensions import BOOM, BOOM_HEIGHT, PAD, POST, WALL
-from factory.floor.layout.feeding import lines_of, outlets_of
+from factory.floor.layout.feeding import housed_outlets, outlets_of
 from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
@@ -33,6 +33,9 @@ RUBBER = (0.20, 0.22, 0.25, 1.0)
 
 Point3 = tuple[float, float, float]
 
+Shape = tuple[str, Point3, Point3, str]
+"""A box that stands: its kind, its place and half its sizes [m], its material."""
+
 
 def add_feeders(
     world: Element,
@@ -41,11 +44,10 @@ def add_feeders(
     hanging: Hanging,
     drives: Mapping[str, Drive],
 ) -> None:
-    """The feeders of a layout, with their sliders and the drives of these, by labels. Sliders of
-    one line share the housing of its first part."""
+    """The feeders of a layout, with their sliders and the drives of these, by labels."""
     outlets = outlets_of(layout)
     codes = feeder_codes(layout.factory, outlets)
-    housed = {line[0].label for line in lines_of(layout) if line}
+    housed = {outlet.label for outlet in housed_outlets(layout)}
     for outlet in outlets:
         at, feeder = outlet.label, outlet.feeder
         if not (at in housed or at in hanging.places):
@@ -60,17 +62,52 @@ def add_feeders(
             quat=heading_quaternion(path),
         )
         if at in housed:
-            _add_housing(body, names.feeder(at), feeder, path.left)
+            shapes = _well(feeder) if feeder.rises else _housing(feeder, path.left)
+            for kind, where, size, material in shapes:
+                add_station(
+                    body, f"{names.feeder(at)}/{kind}", pos=where, size=size, material=material
+                )
         if at not in hanging.places:
             continue
         place, code = hanging.places[at], codes[outlet.robot]
-        joint = _add_slider(body, at, feeder.high + OVER, place, code)
-        stops = stops_of(hanging.lowest(at), feeder.stroke, layout.clearance)
+        end = OVER if feeder.rises else feeder.high + OVER
+        joint = _add_slider(body, at, end, place, code)
+        stops = stops_of(*sorted((hanging.lowest(at), feeder.stroke)), layout.clearance)
         add_drive(actuator, joint, drives[at], stops)
 
 
-def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
-    """What stands still, in a frame whose x is the heading."""
+def _well(feeder: Feeder) -> list[Shape]:
+    """What stands still where parts rise: a box open above, in a frame whose x is the heading."""
+    rear, front, near, far = feeder.inside
+    ahead, across = (rear + front) / 2, (near + far) / 2
+    length, width = front - rear, far - near
+    middle, half = (feeder.low + feeder.high) / 2, (feeder.high - feeder.low) / 2
+    shapes: list[Shape] = [
+        (
+            "post",
+            (ahead, across, feeder.low / 2),
+            (length / 2 + WALL, width / 2 + WALL, feeder.low / 2),
+            "post",
+        )
+    ]
+    return shapes + _walls(ahead, across, (length, width), middle, half)
+
+
+def _walls(
+    ahead: float, across: float, inside: tuple[float, float], middle: float, half: float
+) -> list[Shape]:
+    """The four walls round what is `inside`, of a length and a width [m]."""
+    (length, width), shapes = inside, list[Shape]()
+    for side in (-1, 1):
+        along = ahead + side * (length + WALL) / 2, across, middle
+        beside = ahead, across + side * (width + WALL) / 2, middle
+        shapes.append((f"end{side}", along, (WALL / 2, width / 2 + WALL, half), "housing"))
+        shapes.append((f"wall{side}", beside, (length / 2, WALL / 2, half), "housing"))
+    return shapes
+
+
+def _housing(feeder: Feeder, left: float) -> list[Shape]:
+    """What stands still where parts come down, in a frame whose x is the heading."""
     rear, front, near, far = feeder.inside
     ahead, across = (rear + front) / 2, (near + far) / 2 * left
     length, width = front - rear, far - near
@@ -78,7 +115,7 @@ def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
     middle, half = (low + top - WALL) / 2, (top - WALL - low) / 2
     across_post = feeder.across * left
     boom = rear - WALL - feeder.back - POST / 2
-    shapes: list[tuple[str, Point3, Point3, str]] = [
+    shapes: list[Shape] = [
         ("post", (feeder.back, across_post, top / 2), (POST / 2, POST / 2, top / 2), "post"),
         (
             "boom",
@@ -93,13 +130,7 @@ def _add_housing(body: Element, name: str, feeder: Feeder, left: float) -> None:
             "housing",
         ),
     ]
-    for side in (-1, 1):
-        along = ahead + side * (length + WALL) / 2, across, middle
-        beside = ahead, across + side * (width + WALL) / 2, middle
-        shapes.append((f"end{side}", along, (WALL / 2, width / 2 + WALL, half), "housing"))
-        shapes.append((f"wall{side}", beside, (length / 2, WALL / 2, half), "housing"))
-    for kind, at, size, material in shapes:
-        add_station(body, f"{name}/{kind}", pos=at, size=size, material=material)
+    return shapes + _walls(ahead, across, (length, width), middle, half)
 
 
 def _add_slider(feeder: Element, outlet: str, end: float, at: PadPlace, code: int) -> Element:
@@ -112,6 +143,7 @@ def _add_slider(feeder: Element, outlet: str, end: float, at: PadPlace, code: in
     slide = {"type": "slide", "axis": "0 0 1", "armature": MOTOR, "frictionloss": 0.2}
     joint = add(body, "joint", name=name, **slide)
     x, y, z = (float(v) for v in at.at)
+    begin = z + PAD if end > z else z
     contype, conaffinity = masks_of(code)
     add(
         body,
@@ -130,8 +162,8 @@ def _add_slider(feeder: Element, outlet: str, end: float, at: PadPlace, code: in
         add(body, "body", name=rod),
         rod,
         "cylinder",
-        pos=(x, y, (z + PAD + end) / 2),
-        size=(min(ROD, 0.6 * at.radius), (end - z - PAD) / 2),
+        pos=(x, y, (begin + end) / 2),
+        size=(min(ROD, 0.6 * at.radius), abs(end - begin) / 2),
         material="rail",
     )
     return joint

@@ -52,6 +52,16 @@ class Grip:
         return ahead - x, aside - y, up
 
 
+    @property
+    def pose(self) -> tuple[float, ...]:
+        """Where the body is in the body that holds it, and a quaternion of how it is turned there
+        (7,)."""
+        chains = self.layout.chains
+        if chains and self.robot in chains.robots:
+            return chains.grip(self.robot, self.label, self.centre)
+        return *self.position, *seen_from(self.layout.guidepaths[self.robot], self.fed)
+
+
 def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
     """All grips of a layout's robots on its bodies, robot by robot."""
     factory, product = layout.factory, layout.product

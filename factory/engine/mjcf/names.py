@@ -12,18 +12,21 @@ def carriage(robot: str) -> str:
 
 
 def joint(axis: Axis) -> str:
-    """The joint of an axis: `r3/slide`, `r3/lift`, `r3/turn`."""
-    return f"{axis.robot.name}/{axis.joint.joint}"
+    """The joint of an axis, the first of several: `r3/slide`, `r3/lift`, `r3/turn`."""
+    first = axis.joint.moves[0][0] if axis.joint.moves else axis.joint.joint
+    return f"{axis.robot.name}/{first}"
 
 
 def first_axis(robot: Robot) -> str:
-    """The joint of a robot's first axis: `r3/slide`, `r3/turn`."""
-    return f"{robot.name}/{robot.body.first.joint}"
+    """The joint of a robot's first axis, the first of several: `r3/slide`, `r3/turn`."""
+    moves = robot.body.first.moves
+    return f"{robot.name}/{moves[0][0] if moves else robot.body.first.joint}"
 
 
 def actuator(axis: Axis) -> str:
-    """The actuator of an axis: `r3/drive`, `r3/hoist`."""
-    return f"{axis.robot.name}/{axis.motion.drive}"
+    """The actuator of an axis, the first of several: `r3/drive`, `r3/hoist`."""
+    first = axis.joint.moves[0][1] if axis.joint.moves else axis.motion.drive
+    return f"{axis.robot.name}/{first}"
 
 
 def moved(axis: Axis) -> str:
@@ -52,9 +55,17 @@ def drive_across(robot: str) -> str:
     return f"{robot}/drive_across"
 
 
-def moved_along(robot: str) -> tuple[tuple[str, str], ...]:
-    """The joints, and their actuators, that the first axis of a robot moves where its guidepath has
-    bends."""
+def moved_along(robot: Robot) -> tuple[tuple[str, str], ...]:
+    """The joints, and their actuators, that the first axis of a robot moves: of a chain, or where
+    its guidepath has bends."""
+    name, moves = robot.name, robot.body.first.moves
+    if moves:
+        return tuple((f"{name}/{joint}", f"{name}/{drive}") for joint, drive in moves)
+    return along_bends(name)
+
+
+def along_bends(robot: str) -> tuple[tuple[str, str], ...]:
+    """The joints, and their actuators, of a robot whose guidepath has bends."""
     return (slide(robot), drive(robot)), (slide_across(robot), drive_across(robot))
 
 

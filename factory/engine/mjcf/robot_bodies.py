@@ -7,6 +7,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from factory.engine.mjcf import names
 from factory.engine.mjcf.elements import add, add_shown, numbers
 from factory.engine.mjcf.hands import Styles, load_hand
 from factory.engine.mjcf.names import carriage
@@ -25,6 +26,7 @@ from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.layout import Guidepath, Layout
 from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
+from factory.theory.plant.robot import Robot
 from factory.theory.problem.robot_types import Catalogue
 
 STROKES = {
@@ -127,6 +129,9 @@ def add_robots(
         for axis, drive, span in zip(factory.axes, drives, layout.spans, strict=True)
     ]
     for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
+        if robot.body.first.moves:
+            _add_chain(layout, robot, drives[robot.index], section)
+            continue
         if robot.type not in models:
             model = models[robot.type] = load_robot_model(catalogue[robot.type])
             section["default"].append(model.defaults)
@@ -140,6 +145,21 @@ def add_robots(
             add_follower(body, layout)
         section["worldbody"].append(body)
         section["actuator"].extend(actuators)
+
+
+def _add_chain(
+    layout: Layout, robot: Robot, drive: Drive, section: Mapping[str, Element]
+) -> None:
+    """The body of a robot whose first axis moves several joints, and their actuators."""
+    assert layout.chains is not None
+    layout.chains.add(robot.index, section)
+    gains = layout.chains.drives(robot.index)
+    for (joint, actuator), (kp, kv, force) in zip(
+        names.moved_along(robot), gains, strict=True
+    ):
+        named = {"name": actuator, "joint": joint}
+        each = Drive(kp, kv, force, drive.samples)
+        section["actuator"].append(Element("pid", {**named, **each.attributes()}))
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:

@@ -67,6 +67,8 @@ def timed(
         return _usual(candidates)
     fastest = max(settings.speed * (1 + jitter), settings.outfeed)
     candidates = [s for s in candidates if fastest * s.step < layout.clearance] or candidates[-1:]
+    if layout.chains is not None:
+        return next((s for s in candidates if s.step <= layout.chains.timestep), candidates[-1])
     axes = tuple(dict.fromkeys(_axes(settings, layout, jitter)))
     unusual = [axis for axis in axes if not axis.usual]
     candidates = [s for s in candidates if all(a.follows(s) for a in unusual)] or candidates[-1:]

@@ -3,7 +3,8 @@
 A weld joins a part, at its origin, with a frame fixed to the part's holder. Holders slide: a
 carriage along its guidepath, a lift on a carriage; and the tool of a fixed robot turns about the
 vertical on a lift that slides. So the frame on a holder follows from the coordinates of at most two
-joints, or three where guidepaths have bends, of which the holder's first may turn it.
+joints, or three where guidepaths have bends, of which the holder's first may turn it. A holder at
+the end of a longer chain of joints follows from a product of exponentials of their screws.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.support.arrays import Array, Index
+from factory.support.arrays import Array, Index, Truth
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco
@@ -22,6 +23,9 @@ if TYPE_CHECKING:
 SLIDE, HINGE = 2, 3
 """The engine's numbers of the joints `mjJNT_SLIDE` and `mjJNT_HINGE`: logs are written and read
 without the engine."""
+
+SHALLOW = 3
+"""The most joints that a holder on rails has."""
 
 ROWS = 6
 """Rows of a weld among the engine's constraints: three of place, three of turn."""
@@ -32,7 +36,10 @@ class WeldFrames:
     """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
     `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4). A holder
     that turns has turned its part by `spin` (n,) · qpos[`along` (n, 0)] besides, about a vertical
-    axis that is `arm` (n, 2) away from there when that is 0 [m]."""
+    axis that is `arm` (n, 2) away from there when that is 0 [m]. A holder at the end of a `deep`
+    (n,) chain moves with the joints `along`, from the base on, by their `screws` (n, k, 8): anchor
+    [m], axis, whether it turns, and the coordinate at which `base` and `turn` hold; without such
+    holders these are (n, 0, 8)."""
 
     base: Array = field(repr=False)
     along: Index = field(repr=False)
@@ -40,6 +47,8 @@ class WeldFrames:
     turn: Array = field(repr=False)
     spin: Array = field(repr=False)
     arm: Array = field(repr=False)
+    deep: Truth = field(repr=False)
+    screws: Array = field(repr=False)
 
     @classmethod
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> WeldFrames:
@@ -47,13 +56,48 @@ class WeldFrames:
         are up to date."""
         along, way, anchor, spin = (array[m.eq_obj1id] for array in _joints(m, d))
         base = held_at(m, np.arange(m.neq), d.xpos, d.xmat)
+        held = base.copy()
         base -= (way * d.qpos[along][:, :, None]).sum(axis=1)
         turn = _products(d.xquat[m.eq_obj1id], m.eq_data[:, 6:10])
         angle = spin * d.qpos[along[:, 0]]
         away = base[:, :2] - anchor[:, :2]
         arm = np.where(spin[:, None] != 0, _turned(away, -angle), 0.0)
         base[:, :2] += np.where(spin[:, None] != 0, arm - away, 0.0)
-        return cls(base, along, way, _spun(turn, -angle), spin, arm)
+        frames = cls(
+            base,
+            along,
+            way,
+            _spun(turn, -angle),
+            spin,
+            arm,
+            np.zeros(len(base), bool),
+            np.zeros((len(base), 0, 8)),
+        )
+        return frames._chained(m, d, held, turn)
+
+    def _chained(self, m: mujoco.MjModel, d: mujoco.MjData, held: Array, turn: Array) -> WeldFrames:
+        """The same with the welds of holders at the end of longer chains, which are at `held`
+        (n, 3), turned by `turn` (n, 4) now."""
+        chains = {int(b): _chain(m, int(b)) for b in np.unique(m.eq_obj1id)}
+        deep = np.array([len(chains[int(b)]) > SHALLOW for b in m.eq_obj1id], bool)
+        if not deep.any():
+            return self
+        most = max(self.along.shape[1], *(len(chain) for chain in chains.values()))
+        wider = most - self.along.shape[1]
+        along = np.pad(self.along, ((0, 0), (0, wider)))
+        way = np.pad(self.way, ((0, 0), (0, wider), (0, 0)))
+        screws, spin = np.zeros((len(deep), most, 8)), np.where(deep, 0.0, self.spin)
+        for weld in np.flatnonzero(deep).tolist():
+            joints = chains[int(m.eq_obj1id[weld])]
+            along[weld], way[weld] = 0, 0.0
+            along[weld, : len(joints)] = m.jnt_qposadr[joints]
+            turns = (m.jnt_type[joints] == HINGE)[:, None]
+            at = d.qpos[m.jnt_qposadr[joints]][:, None]
+            row = np.hstack([d.xanchor[joints], d.xaxis[joints], turns, at])
+            screws[weld, : len(joints)] = row
+        base = np.where(deep[:, None], held, self.base)
+        stand = np.where(deep[:, None], turn, self.turn)
+        return WeldFrames(base, along, way, stand, spin, self.arm, deep, screws)
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""
@@ -65,11 +109,34 @@ class WeldFrames:
         places = np.asarray(self.base + np.einsum("nk,nkj->nj", slides, self.way))
         if self.spin.any():
             places[:, :2] += _turned(self.arm, self.spin * slides[:, 0]) - self.arm
+        if self.deep.any():
+            places[self.deep] = self._moved(slides)[0]
         return places
 
     def turned(self, slides: Array) -> Array:
-        """How they are turned (n, 4), quaternions, at coordinates of their joints (n, 2)."""
-        return _spun(self.turn, self.spin * slides[:, 0]) if self.spin.any() else self.turn
+        """How they are turned (n, 4), quaternions, at coordinates of their joints (n, k)."""
+        turn = _spun(self.turn, self.spin * slides[:, 0]) if self.spin.any() else self.turn
+        if self.deep.any():
+            turn = turn.copy()
+            turn[self.deep] = self._moved(slides)[1]
+        return turn
+
+    def _moved(self, slides: Array) -> tuple[Array, Array]:
+        """Where those of deep chains are (n, 3) [m], and how they are turned (n, 4), at coordinates
+        of the joints of all (n, k)."""
+        place, turn = self.base[self.deep].copy(), self.turn[self.deep]
+        screws, off = self.screws[self.deep], slides[self.deep] - self.screws[self.deep, :, 7]
+        for joint in reversed(range(screws.shape[1])):
+            anchor, axis, turns = screws[:, joint, :3], screws[:, joint, 3:6], screws[:, joint, 6]
+            angle = (off[:, joint] * turns)[:, None]
+            gone = (off[:, joint] * (1.0 - turns))[:, None] * axis
+            arm = place - anchor
+            along = (arm * axis).sum(axis=1, keepdims=True) * axis
+            place = anchor + gone + along * (1 - np.cos(angle))
+            place += arm * np.cos(angle) + np.cross(axis, arm) * np.sin(angle)
+            about = np.hstack([np.cos(angle / 2), np.sin(angle / 2) * axis])
+            turn = _products(about, turn)
+        return place, turn
 
 
 def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, Array]:
@@ -88,6 +155,16 @@ def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, A
     way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
     spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
     return m.jnt_qposadr[joint], way, d.xanchor[joints[:, 0]], spin
+
+
+def _chain(m: mujoco.MjModel, body: int) -> list[int]:
+    """The joints that slide or turn a body, from the base on."""
+    joints = list[int]()
+    while body:
+        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+        joints = [*range(first, first + count), *joints]
+        body = int(m.body_parentid[body])
+    return [j for j in joints if m.jnt_type[j] in (SLIDE, HINGE)]
 
 
 def held_at(m: mujoco.MjModel, welds: Index, xpos: Array, xmat: Array) -> Array:

@@ -29,8 +29,7 @@ def add_welds(
     for grip in grips_of(layout, bodies):
         axis = factory.chain(grip.robot)[-1]
         name, body = names.grip(axis.robot.name, grip.label), names.part(grip.label, 1)
-        turn = seen_from(layout.guidepaths[grip.robot], grip.fed)
-        _weld(equality, name, names.moved(axis), body, (*grip.position, *turn))
+        _weld(equality, name, names.moved(axis), body, grip.pose)
     outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
     for label, outlet in outlets.items():
         path, slider = layout.guidepaths[outlet.robot], hanging.slider[label]

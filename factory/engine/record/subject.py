@@ -95,7 +95,7 @@ class MonitorSubject:
         marking = factory.net.initial_marking if start is None else start
         patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
         subject = cls(factory, goals, radii, places, settings, marking, patience, wip, early)
-        bent = {robot: layout.guidepaths[robot] for robot in layout.curves[0]}
+        bent = {robot: path for robot, path in enumerate(layout.guidepaths) if path.bends}
         if bent:
             bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
             subject = replace(subject, bends=bends)

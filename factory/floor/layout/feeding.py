@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import hypot
 
@@ -67,6 +68,13 @@ def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
     )
 
 
+def housed_outlets(layout: Layout) -> Iterator[Outlet]:
+    """The outlets with a housing of their own: parts of one line that come down share that of its
+    first part, those that rise do not."""
+    for line in lines_of(layout):
+        yield from line if line and line[0].feeder.rises else line[:1]
+
+
 def feeder_of(layout: Layout, label: str) -> Feeder:
     """The feeder of a part: a housing over the place where the part is presented, and the post that
     carries it, behind the rear stop of the robot that it serves. Parts of one line share a housing,
@@ -74,6 +82,8 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     by_label, room = layout.factory.by_label, Clearance(layout.clearance).room
     operation = by_label[label]
     robot = operation.carrier
+    if layout.chains and robot in layout.chains.robots:
+        return layout.chains.feeder(label)
     path, shown = layout.guidepaths[robot], layout.magazine(robot)
     visit = layout.visits[operation.index, robot]
     middle, elevation = path.middle(visit.at), visit.elevation
@@ -119,6 +129,8 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
 def passing(layout: Layout, leaf: Operation) -> float:
     """How far a feeder's robot goes until all its payloads are clear of any part that comes down
     next [m]."""
+    if layout.chains and leaf.carrier in layout.chains.robots:
+        return layout.chains.passing(leaf.index)
     return cleared(layout, leaf.carrier, layout.guidepaths[leaf.carrier].sideways)
 
 

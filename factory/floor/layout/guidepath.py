@@ -206,7 +206,8 @@ class Guidepath:
 
 @dataclass(frozen=True, slots=True)
 class Feeder:
-    """A magazine, from which a part comes down to where it is presented. About the product's
+    """A magazine, from which a part comes down to where it is presented, or, with a negative
+    stroke, rises to there. About the product's
     middle, in the frame (u, t) of the robot: the post is at `back`, `across` from the middle, and
     `inside` is the box that the housing's walls are round. In the world: the boxes of `post`,
     `boom` and `housing`; from what height to what height the housing reaches, `low` and `high`,
@@ -221,3 +222,8 @@ class Feeder:
     low: float
     high: float
     stroke: float
+
+    @property
+    def rises(self) -> bool:
+        """Whether parts come from below."""
+        return self.stroke < 0.0

@@ -10,9 +10,16 @@ import numpy as np
 
 from factory.floor.geometry.common_places import Top, common_places
 from factory.floor.geometry.solids import Solid
-from factory.floor.geometry.suction import GAP, PadPlace, pad_place
+from factory.floor.geometry.suction import (
+    GAP,
+    NARROWEST,
+    SHARE,
+    WIDEST,
+    PadPlace,
+    pad_place,
+)
 from factory.floor.geometry.turning import presented
-from factory.floor.layout.dimensions import PAYLOAD
+from factory.floor.layout.dimensions import PAD, PAYLOAD
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
@@ -53,9 +60,11 @@ class Hanging:
         pads, slider = _FeederPads(), dict[str, str]()
         places: dict[str, PadPlace] = {}
         for line in lines_of(layout):
-            common = pads.common(line) if line[1:] else {}
+            rises = bool(line) and line[0].feeder.rises
+            common = pads.common(line) if line[1:] and not rises else {}
             for outlet in line:
-                named, place = common.get(outlet.label) or (outlet.label, pads.of(outlet))
+                own = pads.under if rises else pads.of
+                named, place = common.get(outlet.label) or (outlet.label, own(outlet))
                 slider[outlet.label] = named
                 places.setdefault(named, place)
         outlets = {outlet.label: outlet for outlet in outlets_of(layout)}
@@ -90,6 +99,14 @@ class _FeederPads:
             self._found[key] = PadPlace(place.at - solid.position, place.radius)
         pad = self._found[key]
         return _seen(outlet, pad.at + solid.position, pad.radius)
+
+    def under(self, outlet: Outlet) -> PadPlace:
+        """That on which an outlet's part stands where it rises, below its centre of mass: the
+        middle of the pad's lower face."""
+        solid = _solid(outlet)
+        wide = float((solid.high - solid.low)[:2].min())
+        at = np.array([*solid.centre[:2], solid.low[2] - GAP - PAD])
+        return _seen(outlet, at, max(min(WIDEST, SHARE * wide), NARROWEST))
 
     def common(self, line: Sequence[Outlet]) -> dict[str, tuple[str, PadPlace]]:
         """By the outlets of a line, after which of them the slider of each is named, and where that

@@ -10,6 +10,7 @@ from types import MappingProxyType
 
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.certificate import Certificate
+from factory.floor.layout.chains import Chains, JointCurves
 from factory.floor.layout.dimensions import BEHIND, BELT_GAP, PAYLOAD, PLAY, SIDE, TRAY, WALL, up
 from factory.floor.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hull, moved
 from factory.floor.layout.hands.hand import Hand
@@ -44,6 +45,7 @@ class Layout(Keeping, Pictured):
         certificate: its clearance certificate.
         plain: the layout without relays; None where this is one.
         tile: size of the tiles of the platen over which robots go [m]; 0 where they go on rails.
+        chains: the robots whose first axes move several joints; None where there are none.
     """
 
     factory: Factory
@@ -58,6 +60,7 @@ class Layout(Keeping, Pictured):
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
     tile: float = 0.0
+    chains: Chains | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("visits", "payloads"):
@@ -103,8 +106,11 @@ class Layout(Keeping, Pictured):
         return float(sum(g.length for g in self.guidepaths if g.travels))
 
     @cached_property
-    def curves(self) -> tuple[tuple[int, ...], Ways]:
-        """The robots (index) whose guidepaths have bends, and the curves that these are."""
+    def curves(self) -> tuple[tuple[int, ...], JointCurves]:
+        """The robots (index) whose first axes move several joints, and the curves in the space of
+        these: chains, or else robots whose guidepaths have bends."""
+        if self.chains is not None:
+            return self.chains.robots, self.chains.curves
         robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
         paths = [self.guidepaths[robot] for robot in robots]
         return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
@@ -242,6 +248,8 @@ class Layout(Keeping, Pictured):
         """
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
+        if self.chains and slot == operation.lowered and operation.robots[slot] in self.chains.robots:
+            return self.chains.standoff(operation.index)
         path = self.guidepaths[operation.robots[slot]]
         if slot == operation.lowered and not path.travels:
             return min(BESIDE, path.travel)

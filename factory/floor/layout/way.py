@@ -117,11 +117,25 @@ class Ways:
         best = np.arange(len(places)), np.einsum("npj,npj->np", left, left).argmin(axis=1)
         return self.middle[best] + off[best], first[best] + off[best][:, None] * second[best]
 
-    def along(self, places: Array, velocities: Array) -> tuple[Array, Array]:
+    def along(
+        self, rows: Index, places: Array, velocities: Array, near: Array
+    ) -> tuple[Array, Array]:
         """The coordinates (n,) of the points that are nearest to places (n, d), and the speeds (n,)
-        along the ways of velocities (n, d)."""
+        along the ways of velocities (n, d). `rows` (n,) are all ways; what is `near` is not
+        needed."""
         x, first = self.nearest(places)
         return x, (velocities * first).sum(axis=-1) / (first**2).sum(axis=-1)
+
+    def force(
+        self, rows: Index, motion: tuple[Array, Array, Array], mass: Array, load: Array
+    ) -> Array:
+        """The forces (..., m, d) of drives along each axis that move masses (m,), with their loads
+        (m,) [kg], along the ways `rows` (m,): at coordinates (..., m), speeds and accelerations
+        [N]."""
+        x, v, a = motion
+        _, first, second = self.at(rows, x)
+        gain = first * a[..., None] + second * (v**2)[..., None]
+        return np.asarray((mass + load)[:, None] * gain)
 
     def pieces(self, row: int, low: float, high: float) -> Iterator[Array]:
         """A way between two coordinates [m] piece by piece: the two ends of a straight one, the

@@ -176,8 +176,10 @@ class Factory(Pictured):
         0."""
         lowered: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
         for o in self.operations:
-            if o.approach is not None and o.lowered >= 0:
-                robot = o.robots[o.lowered]
+            if o.approach is None or o.lowered < 0:
+                continue
+            robot = o.robots[o.lowered]
+            if self.robots[robot].body.lifts:
                 lowered[robot] = max(lowered.get(robot, 0.0), o.approach.stroke)
         return MappingProxyType(dict(sorted(lowered.items())))
 

@@ -28,36 +28,42 @@ FRICTION = 0.2
 SLIDE, LIFT_JOINT, TURN_JOINT = "slide", "lift", "turn"
 """The joints of robots: along a guidepath, up, and about the vertical."""
 
+WAY = "way"
+"""The axis that moves all joints of a chain along a curve in joint space."""
+
 
 @dataclass(frozen=True, slots=True)
 class JointMotion:
     """How a joint moves a robot and what it carries.
 
     Attributes:
-        word: `along` a guidepath, `up`, or `turn` about the vertical.
+        word: `along` a guidepath or a curve, `up`, or `turn` about the vertical.
         body: the body with the joint, in the MJCF of a robot type.
-        direction: the axis of the joint there (3,).
+        direction: the axis of the joint there (3,); nothing for a curve of several joints.
         drive: name of the actuator.
         rotary: whether the coordinate is an angle [rad]; else it is a length [m].
         hangs: whether the drive bears the weight of what moves; else a guide or a bearing does.
         rolls: whether the weight of a load adds to the friction.
         lever: distance that the robot goes for a unit of the coordinate [m].
+        lowers: whether the robot lowers by it what it delivers.
     """
 
     word: str
     body: str
-    direction: tuple[float, float, float]
+    direction: tuple[float, ...]
     drive: str
     rotary: bool = False
     hangs: bool = False
     rolls: bool = False
     lever: float = 1.0
+    lowers: bool = False
 
 
 MOTIONS = {
     SLIDE: JointMotion("along", "carriage", (-1.0, 0.0, 0.0), "drive", rolls=True),
-    LIFT_JOINT: JointMotion("up", "head", (0.0, 0.0, 1.0), "hoist", hangs=True),
+    LIFT_JOINT: JointMotion("up", "head", (0.0, 0.0, 1.0), "hoist", hangs=True, lowers=True),
     TURN_JOINT: JointMotion("turn", "tool", (0.0, 0.0, 1.0), "drive", rotary=True, lever=0.1),
+    WAY: JointMotion("along", "tool", (), "drive", lowers=True),
 }
 """How a robot moves by each joint, from the carriage up. At the end of an arm of 0.1 m, what turns
 is as fast as other robots are."""
@@ -75,6 +81,8 @@ class RobotAxis:
         kp, kv: gains of its drive [N/m, N s/m], None where they are sized for the payload.
         force: the most that its motor gives [N]; of a hinge [N m].
         position: where its drive is written.
+        moves: the joints of the MJCF that it moves together, each with its actuator; nothing where
+            it is one joint.
     """
 
     joint: str
@@ -85,6 +93,7 @@ class RobotAxis:
     kv: float | None = None
     force: float = inf
     position: Position | None = field(default=None, compare=False, repr=False)
+    moves: tuple[tuple[str, str], ...] = ()
 
     @property
     def motion(self) -> JointMotion:
@@ -122,8 +131,13 @@ class RobotBody:
 
     @property
     def travels(self) -> bool:
-        """Whether it goes along a guidepath; else it stands where it works."""
-        return self.axes[0].joint == SLIDE
+        """Whether it goes along a guidepath or a curve; else it stands where it works."""
+        return self.axes[0].motion.word == "along"
+
+    @property
+    def lifts(self) -> bool:
+        """Whether it has a lift."""
+        return any(axis.joint == LIFT_JOINT for axis in self.axes)
 
     @property
     def motions(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from factory.theory.problem.robot_bodies import LIFT_JOINT, MOTIONS, SLIDE, TURN
 JOINTS = {
     joint: (motion.body, "hinge" if motion.rotary else "slide", motion.direction)
     for joint, motion in MOTIONS.items()
+    if motion.direction
 }
 """Each joint that a robot may have: its body, type and axis."""
 

@@ -46,7 +46,7 @@ class RobotType:
     @property
     def lowers(self) -> bool:
         """Whether it lowers what it delivers."""
-        return "up" in self.body.motions
+        return any(axis.motion.lowers for axis in self.body.axes)
 
 
 @dataclass(frozen=True)

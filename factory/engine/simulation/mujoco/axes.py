@@ -97,13 +97,14 @@ class Axes:
         qpos[self.qpos[axes]] = x
         which, rows = self.curves.among(axes)
         if len(rows):
-            place, _, _ = self.curves.ways.at(rows, x[which])
-            qpos[self.curves.qpos[rows]] = place
+            curves = self.curves
+            qpos[curves.qpos[rows]] = curves.ways.at(curves.now[rows], x[which])[0]
+            curves.at[rows] = x[which]
 
     def off(self, d: mujoco.MjData, x: Array) -> Array:
         """Distance of all axes (axes,) from positions [m]."""
         off, curves = np.abs(d.qpos[self.qpos] - x), self.curves
         if len(curves.axes):
-            place, _, _ = curves.ways.at(np.arange(len(curves.axes)), x[curves.axes])
+            place, _, _ = curves.ways.at(curves.now, x[curves.axes])
             off[curves.axes] = np.linalg.norm(d.qpos[curves.qpos] - place, axis=-1)
         return np.asarray(off)

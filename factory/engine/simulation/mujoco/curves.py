@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.engine.mjcf import names
+from factory.floor.layout.chains import Chains, JointCurves
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.way import Ways
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
+from factory.theory.plant.operation import Operation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +20,10 @@ class Curves:
 
     Attributes:
         axes: their numbers (b,).
-        ways: the curves.
+        ways: all curves.
+        chains: what a layout says of chains; None where axes follow one curve each.
+        now: the curve that each axis follows now (b,), its row in `ways`.
+        at: the coordinates that were measured last (b,) [m].
         row: the place of an axis in `axes`, -1 for none (axes,).
         qpos: addresses of the joints' positions in the engine's data (b, d).
         dof: addresses of their speeds (b, d).
@@ -28,7 +32,10 @@ class Curves:
     """
 
     axes: Index
-    ways: Ways
+    ways: JointCurves
+    chains: Chains | None
+    now: Index
+    at: Array
     row: Index
     qpos: Index
     dof: Index
@@ -39,7 +46,7 @@ class Curves:
     def of(cls, m: mujoco.MjModel, layout: Layout, count: int) -> Curves:
         """The curves of a layout with a given number of axes in its compiled model."""
         robots, ways = layout.curves
-        moved = [names.moved_along(layout.factory.robots[robot].name) for robot in robots]
+        moved = [names.moved_along(layout.factory.robots[robot]) for robot in robots]
         joints = [m.joint(joint).id for each in moved for joint, _ in each]
         drives = [m.actuator(drive).id for each in moved for _, drive in each[1:]]
         axes, row = np.array(robots, np.intp), np.full(count, -1)
@@ -47,7 +54,19 @@ class Curves:
         joint = np.array(joints, np.intp).reshape(-1, ways.dimension)
         qpos, dof = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
         further = np.array(drives, np.intp).reshape(-1, ways.dimension - 1)
-        return cls(axes, ways, row, qpos, dof, further)
+        now, at = np.arange(len(axes)), np.array([layout.guidepaths[r].length for r in robots])
+        made = cls(axes, ways, layout.chains, now, at, row, qpos, dof, further)
+        for robot in robots:
+            made.take(layout.factory.first(robot))
+        return made
+
+    def take(self, operation: Operation) -> None:
+        """Let the robots of an operation follow its curves."""
+        if self.chains is None:
+            return
+        for robot in operation.robots:
+            if self.row[robot] >= 0:
+                self.now[self.row[robot]] = self.chains.row(operation.index, robot)
 
     def among(self, axes: Index) -> tuple[Index, Index]:
         """Which of some axes move several joints, and their rows."""
@@ -63,15 +82,16 @@ class Curves:
     def spread(self, x: Array, along: Array) -> Array:
         """A quantity along axes (k, axes) at positions (axes,), resolved into the first joints,
         then all others (k, axes + b (d - 1))."""
-        _, first, _ = self.ways.at(np.arange(len(self.axes)), x[self.axes])
+        _, first, _ = self.ways.at(self.now, x[self.axes])
         every, joints = along[:, self.axes, None] * first, along.copy()
         joints[:, self.axes] = every[..., 0]
         return np.concatenate([joints, every[..., 1:].reshape(len(along), -1)], axis=1)
 
     def along(self, places: Array, speeds: Array) -> tuple[Array, Array]:
         """Coordinates and speeds (b,) of positions and velocities of joints (b, d)."""
-        state = places.tobytes() + speeds.tobytes()
+        state = places.tobytes() + speeds.tobytes() + self.now.tobytes()
         if state not in self.latest:
             self.latest.clear()
-            self.latest[state] = self.ways.along(places, speeds)
+            self.latest[state] = self.ways.along(self.now, places, speeds, self.at)
+            self.at[:] = self.latest[state][0]
         return self.latest[state]

@@ -138,7 +138,7 @@ class Parts:
             radii[ids] = model.carried.radius[label]
         self.welds = Welds(arrays, d, self.masks, motion.sleep, radii)
         self.holdings = Holdings(m, model, body, self.welds)
-        passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
+        passing, supply = Passing(m, d, model, request, motion.axes), Supply(model, request, counts)
         self.feeders = Feeders(model, self.holdings, self.welds, motion.sliders, passing, supply)
         self.strength = Strength(m, d, model, self.holdings.grips())
         self.joining = Joining(model, self.holdings, self.welds)

@@ -54,13 +54,18 @@ class Passing:
     last is not delivered yet."""
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, request: RunRequest
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        model: Model,
+        request: RunRequest,
+        axes: Axes,
     ) -> None:
         factory, layout = model.factory, model.layout
         outlets = outlets_of(layout)
         carriers = [outlet.robot for outlet in outlets]
         self._d, self._carriers = d, np.array(carriers, np.intp)
-        self._axes = Axes.of(m, layout)
+        self._axes = axes
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
         self._clear = self._home - [passing(outlet.layout, outlet.leaf) for outlet in outlets]
         hands = [layout.hand(robot) for robot in carriers]

@@ -133,7 +133,8 @@ class Sliders:
     def is_up(self, number: int) -> bool:
         """Whether a resting slider is up."""
         low, high = self._strokes.low[number], self._strokes.high[number]
-        return bool(self._d.qpos[self._address[number]] > (low + high) / 2)
+        at = self._d.qpos[self._address[number]]
+        return bool(abs(at - high) < abs(at - low))
 
     def rises(self, number: int) -> bool:
         """Whether a slider is on its way up."""

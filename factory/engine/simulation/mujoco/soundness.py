@@ -23,7 +23,7 @@ from factory.engine.simulation.mujoco.contacts import ContactMasks
 from factory.engine.simulation.mujoco.fusing import angles, rotations
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.probing import untouched
-from factory.floor.layout.feeding import lines_of
+from factory.floor.layout.feeding import housed_outlets
 from factory.floor.layout.hands.limbs import limbs
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
@@ -156,9 +156,13 @@ class Soundness:
         loose = [self._name[geom] for geom in [*stations[~solid], *np.flatnonzero(soft)]]
         robots = [robot for robot in layout.factory.robots if layout.hands]
         limbed = {f"{r.name}/{limb.name}" for r in robots for limb in limbs(layout, r.index)}
-        housed = [names.feeder(line[0].label) for line in lines_of(layout) if line]
         wanted = {"ground", names.OUTFEED_TRAY, names.SHUTTER} | limbed
-        wanted |= {f"{feeder}/{kind}" for feeder in housed for kind in HOUSING}
+        wanted |= {
+            f"{names.feeder(outlet.label)}/{kind}"
+            for outlet in housed_outlets(layout)
+            for kind in HOUSING
+            if kind != "lid" or not outlet.feeder.rises
+        }
         sliders = [n for n in map(self._body, range(m.nbody)) if n.endswith("/slider")]
         wanted |= {names.pad(n.removeprefix("feeder/").removesuffix("/slider")) for n in sliders}
         loose += sorted(wanted.difference(self._name[geom] for geom in stations.tolist()))

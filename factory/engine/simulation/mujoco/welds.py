@@ -74,6 +74,7 @@ class PadGaps:
         self._frames = WeldFrames.of(m, d)
         self._pads = Pads(m)
         self._at_zero, self._turned = d.geom_xpos.copy(), rotations(m.geom_quat)
+        self._stood = d.geom_xmat.reshape(-1, 3, 3).copy()
         self._welds = {h: np.flatnonzero(m.eq_obj1id == h) for h in self._pads.of}
         for holder, welds in self._welds.items():
             pads, weld = self._pads.of[holder], welds[0]
@@ -94,8 +95,14 @@ class PadGaps:
 
     def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
         m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
-        along, way = self._frames.along[weld], self._frames.way[weld]
-        d.geom_xpos[pads] = self._at_zero[pads] + d.qpos[along] @ way
+        frame = self._frames.chosen(np.array([weld]))
+        slides = d.qpos[frame.along]
+        d.geom_xpos[pads] = self._at_zero[pads] + slides[0] @ frame.way[0]
+        if frame.deep[0]:
+            turn = rotations(frame.turned(slides))[0] @ rotations(frame.turn)[0].T
+            off = self._at_zero[pads] - frame.base[0]
+            d.geom_xpos[pads] = frame.at(slides)[0] + off @ turn.T
+            d.geom_xmat[pads] = (turn @ self._stood[pads]).reshape(-1, 9)
         for body in bodies:
             geoms = self._pads.solid[body]
             at = m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)

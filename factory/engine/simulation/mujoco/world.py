@@ -98,7 +98,7 @@ class MujocoWorld:
         stepping = self.m, self.d, self.inspection, self.hooks, model.settings
         self.motion.stepping = (
             Strides(*stepping, Neighbours(self.m, self.d, self.parts, self.motion.axes))
-            if request.fast
+            if request.fast and model.layout.chains is None
             else SingleSteps(*stepping)
         )
         self.motion.begin(self.parts.holdings.loads())
@@ -156,6 +156,7 @@ class MujocoWorld:
         """Hand the parts of ended operations over: welds off and on in one tick."""
         for operation, unit in started:
             self.inspection.joining[operation.index] = unit
+            self.motion.axes.curves.take(operation)
         if ended:
             self._hand_over(ended)
             self.hooks.tell_ended()

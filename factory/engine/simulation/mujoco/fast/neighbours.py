@@ -63,7 +63,7 @@ class Extents:
         number, bent = self._number[axes], self._every.curves
         which, rows = bent.among(axes)
         if len(rows):
-            place, _, _ = bent.ways.at(rows, x[:, which])
+            place, _, _ = bent.ways.at(bent.now[rows], x[:, which])
             x = np.concatenate([x, place[..., 1]], axis=1)
             x[:, which] = place[..., 0]
             number = np.concatenate([number, self._second[rows]])

@@ -1,0 +1,84 @@
+"""From a product to the factory of a cell: a carrier that brings the first part along, and an arm
+that places all others on it.
+
+Every join becomes a `place`, whose second input an arm lowers. The robots that bring those are one
+arm, whose tours follow each other in the order of the joins, so the net is live (Theorem 18).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from factory.api import Diagnostic, InputError, Plan, Project
+from factory.apps.arms.body import STEM_MASS, mass_of
+from factory.apps.arms.read import read_chain
+from factory.theory.lang.template_reader import read_template
+from factory.theory.problem.pag import PAG, Assembly
+from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
+from factory.theory.problem.robot_types import Catalogue, RobotType
+
+MODELS = Path(__file__).with_name("mjcf")
+"""The files of the arms that are shipped."""
+
+PLACE = """
+place = (R, j, ~, <a; b>, F) where
+  R = < dot, {kind} >;
+  j = 1;
+  ~ = {{ S1 = A2 }};
+  <a; b> = < LAB1, LAB2; LAB3, nopart >;
+  F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps;
+  further = place;
+  failure = {{ residual > 5e-4 : stop }};
+"""
+"""The operation in which an arm of a kind lowers what it has fetched onto what a carrier brings."""
+
+
+def robot_type(kind: str, file: Path) -> RobotType:
+    """The robot type of an arm: a dot whose axis moves all joints of its chain. Raises InputError
+    (BadArm)."""
+    chain, moved = read_chain(file), 0.0
+    moves = tuple((joint, joint) for joint in chain.joints)
+    moved = float(chain.inertia.mass.sum()) + STEM_MASS
+    axis = RobotAxis(WAY, moved, moves=moves)
+    return RobotType(kind, file, RobotBody(CARRIAGE, mass_of(file), (axis,)), "dot")
+
+
+def armed(project: Project, kind: str) -> Project:
+    """The project in which an arm of a kind places all parts but the first. Raises InputError
+    (NeedsNest) where two sub-assemblies are joined."""
+    catalogue, pag = project.catalogue, _placing(project.pag)
+    types = {**catalogue.types, kind: robot_type(kind, MODELS / f"{kind}.xml")}
+    templates = {**project.templates, "place": read_template(PLACE.format(kind=kind), f"{kind}.op")}
+    lowered = {node.label: node.inputs[-1] for node in pag.nodes if len(node.inputs) > 1}
+    made = replace(
+        project, pag=pag, templates=templates, catalogue=Catalogue(types), lowered=lowered
+    )
+    robots = made.compiled.robots
+    turn, crew = list[int](), list[str]()
+    for robot in robots:
+        name = kind if robot.type == kind else f"{robot.name}"
+        if name not in crew:
+            crew.append(name)
+        turn.append(crew.index(name))
+    return made.with_plan(Plan(turns=(tuple(turn),), lifts=frozenset()))
+
+
+def _placing(pag: PAG) -> PAG:
+    """The tree with a place for each join, the sub-assembly first."""
+    return replace(pag, nodes=tuple(_nodes(pag)))
+
+
+def _nodes(pag: PAG) -> Iterator[Assembly]:
+    for node in pag.nodes:
+        if len(node.inputs) < 2:
+            yield node
+            continue
+        piles = [label for label in node.inputs if pag[label].inputs]
+        if len(piles) > 1:
+            message = f"'{node.label}' joins the sub-assemblies {', '.join(map(repr, piles))}"
+            hint = "a cell of one arm adds part by part; leave out --arm"
+            raise InputError(Diagnostic("NeedsNest", message, node.position, hint))
+        inputs = (*piles, *(label for label in node.inputs if label not in piles))
+        yield replace(node, operation="place", inputs=inputs)

@@ -1,0 +1,119 @@
+"""The body of an arm in a model: that of its file on a pedestal, with a suction tool at its site."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from math import cos, sin
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from factory.api import mujoco
+
+STEM, PAD = 0.10, 0.004
+"""Length of the tool, of which its pad [m]."""
+
+STEM_RADIUS, PAD_RADIUS = 0.006, 0.008
+"""Radii of the tool's stem and pad [m]."""
+
+PEDESTAL = 0.075
+"""Radius of a pedestal [m]."""
+
+PEDESTAL_MASS, STEM_MASS = 20.0, 0.08
+"""What these weigh [kg]."""
+
+GRAPHITE = "0.13 0.14 0.16 1"
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """Where an arm stands.
+
+    Attributes:
+        place: of its base in the world (3,) [m].
+        yaw: angle of its base about the vertical [rad].
+    """
+
+    place: tuple[float, float, float]
+    yaw: float
+
+
+def standing(file: Path, stand: Stand, site: str = "tool") -> Element:
+    """The MJCF of an arm's file, with the arm on its stand: its outermost body is `carriage`, and
+    `tool` is the frame of the tip of its tool, z out of it."""
+    root = ElementTree.parse(file).getroot()
+    body = root.findall("worldbody/body")[0]
+    body.set("name", "carriage")
+    body.set("pos", " ".join(f"{v:.9g}" for v in stand.place))
+    body.set("quat", f"{cos(stand.yaw / 2):.12g} 0 0 {sin(stand.yaw / 2):.12g}")
+    body.insert(0, _cylinder("pedestal", PEDESTAL, -stand.place[2], 0.0, PEDESTAL_MASS, GRAPHITE))
+    holder = next(b for b in body.iter("body") for s in b.findall("site") if s.get("name") == site)
+    mount = next(s for s in holder.findall("site") if s.get("name") == site)
+    tool = SubElement(holder, "body", {"name": "tool"})
+    for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
+        if key in mount.attrib:
+            tool.set(key, mount.attrib[key])
+    tool.append(
+        _cylinder("stem", STEM_RADIUS, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1")
+    )
+    tool.append(_cylinder("pad", PAD_RADIUS, STEM - PAD, STEM, 0.0, GRAPHITE))
+    return root
+
+
+def mass_of(file: Path) -> float:
+    """What an arm weighs with its pedestal and its tool [kg]."""
+    root = standing(file, Stand((0.0, 0.0, 0.1), 0.0))
+    m = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+    return float(m.body_subtreemass[m.body("carriage").id])
+
+
+def _cylinder(
+    name: str, radius: float, low: float, high: float, mass: float, rgba: str
+) -> Element:
+    return Element(
+        "geom",
+        {
+            "name": name,
+            "type": "cylinder",
+            "size": f"{radius:.6g}",
+            "fromto": f"0 0 {low:.9g} 0 0 {high:.9g}",
+            "mass": f"{mass:.6g}",
+            "contype": "1",
+            "conaffinity": "1",
+            "group": "0",
+            "rgba": rgba,
+        },
+    )
+
+
+def add(root: Element, robot: str, kind: str, section: Mapping[str, Element]) -> None:
+    """Put an arm, as `standing` gives it, into the sections of a model: its names begin with the
+    robot's, and its classes and materials with those of its kind, which are there once."""
+    body = _prefixed(root.findall("worldbody/body")[0], kind)
+    for node in body.iter():
+        if "name" in node.attrib:
+            node.set("name", f"{robot}/{node.get('name')}")
+    moved = next(inner for inner in body.iter("body") if inner.find("joint") is not None)
+    moved.set("sleep", "allowed")
+    section["worldbody"].append(body)
+    there = {d.get("class") for d in section["default"].findall("default")}
+    if kind in there:
+        return
+    shared = SubElement(section["default"], "default", {"class": kind})
+    for child in root.findall("default/*"):
+        shared.append(_prefixed(child, kind))
+    for asset in root.findall("asset/*"):
+        named = _prefixed(asset, kind)
+        named.set("name", f"{kind}/{named.get('name')}")
+        section["asset"].append(named)
+
+
+def _prefixed(element: Element, prefix: str) -> Element:
+    copy = deepcopy(element)
+    for node in copy.iter():
+        for key in ("class", "childclass", "material", "mesh", "texture"):
+            if key in node.attrib:
+                node.set(key, f"{prefix}/{node.get(key)}")
+    return copy

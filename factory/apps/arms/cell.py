@@ -1,0 +1,194 @@
+"""A cell: a carrier's line with an arm beside it, and the arm's feeders on a circle round its base.
+
+The carrier always stops at the same station. The arm takes each part from a feeder of its own, in
+which it rises from below, and lowers it onto what the carrier brings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import cos, hypot, sin
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from factory.api import Array, Factory, mujoco
+from factory.apps.arms.body import STEM, Stand, add, standing
+from factory.apps.arms.curves import LegTable
+from factory.floor.geometry.solids import Product, Solid
+from factory.floor.geometry.suction import pad_place
+from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
+from factory.floor.layout.guidepath import Feeder
+
+GAP = 2e-4
+"""Between the pad of an arm and what it holds [m]."""
+
+FLOOR = 0.02
+"""Height of the bottom of a well above the floor [m]."""
+
+BELOW = 0.005
+"""Between the lowest place of a feeder's pad and the bottom of its well [m]."""
+
+APART = 0.02
+"""Between what stands beside each other [m]."""
+
+PEDESTAL_HEIGHT = 0.10
+"""Height of an arm's base [m]."""
+
+NEAR, ROUND = 0.5, 0.52
+"""Shares of an arm's reach: its distance from the station, and that of its feeders."""
+
+
+@dataclass(frozen=True, slots=True)
+class Well:
+    """A feeder in which a part rises.
+
+    Attributes:
+        place: of the product's middle when the part is shown (x, y) [m].
+        elevation: of the part above its place in the product [m].
+        feeder: its shape.
+    """
+
+    place: tuple[float, float]
+    elevation: float
+    feeder: Feeder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grip:
+    """Where an arm's tool is on a part.
+
+    Attributes:
+        tip: of the tool, in the product's frame (3,) [m].
+        yaw: angle of the tool about the vertical [rad].
+    """
+
+    tip: Array
+    yaw: float
+
+    @property
+    def turn(self) -> Array:
+        """Orientation of the tool in the world (3, 3), its z down."""
+        return down(self.yaw)
+
+
+def down(yaw: float) -> Array:
+    """The orientation (3, 3) of a tool that points down, turned about the vertical [rad]."""
+    c, s = cos(yaw), sin(yaw)
+    return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+
+
+def tip_on(solid: Solid) -> Array:
+    """Where the tip of a tool is on a part, in the product's frame (3,) [m]."""
+    place = pad_place(solid, (1.0, 0.0))
+    top = np.array(place.at)
+    return top + [0.0, 0.0, GAP - 1e-4]  # `pad_place` is a pad's gap above the part
+
+
+@dataclass(eq=False)
+class CellChains:
+    """What a cell says of its arms to the layout (`factory.floor.layout.chains.Chains`).
+
+    Attributes:
+        factory: the factory.
+        robots: the arms (index).
+        file: MJCF of the arms.
+        stands: where each stands.
+        wells: the feeder of each label.
+        grips: of each label.
+        curves: the legs.
+        rows: by operation and robot, the leg.
+        standoffs: by operation, how far short of its place an arm waits [m].
+        clear: by operation that takes a part, how far it goes until that part's feeder is
+            clear [m].
+    """
+
+    factory: Factory
+    product: Product
+    robots: tuple[int, ...]
+    file: Path
+    stands: Mapping[int, Stand]
+    wells: Mapping[str, Well]
+    grips: Mapping[str, Grip]
+    curves: LegTable
+    rows: Mapping[tuple[int, int], int]
+    standoffs: Mapping[int, float]
+    clear: Mapping[int, float]
+    gains: Sequence[tuple[float, float, float]]
+    timestep: float = 0.002
+
+    def row(self, operation: int, robot: int) -> int:
+        return self.rows[operation, robot]
+
+    def feeder(self, label: str) -> Feeder:
+        return self.wells[label].feeder
+
+    def passing(self, operation: int) -> float:
+        return self.clear[operation]
+
+    def standoff(self, operation: int) -> float:
+        return self.standoffs[operation]
+
+    def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
+        grip = self.grips[label]
+        place = grip.turn.T @ (np.asarray(centre) - grip.tip) + [0.0, 0.0, STEM]
+        quaternion = np.empty(4)
+        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(grip.turn.T).ravel())
+        return (*place.tolist(), *quaternion.tolist())
+
+    def add(self, robot: int, section: Mapping[str, Element]) -> None:
+        of = self.factory.robots[robot]
+        root = standing(self.file, self.stands[robot])
+        add(root, of.name, of.type, section)
+
+    def drives(self, robot: int) -> Sequence[tuple[float, float, float]]:
+        return self.gains
+
+
+def well_of(
+    product: Product, solid: Solid, place: tuple[float, float], show: float, clearance: float
+) -> Well:
+    """The feeder of a part that is shown with its bottom at a height.
+
+    Args:
+        product: the product.
+        solid: the part.
+        place: of the part's middle in the world (x, y) [m].
+        show: height of its bottom [m].
+        clearance: between the part and the rim, and the rim and others [m].
+    """
+    low, high, middle = solid.low, solid.high, product.middle
+    half = (high - low)[:2] / 2
+    at = (low + high)[:2] / 2
+    tall = float(high[2] - low[2])
+    room = clearance / 2
+    stroke = room + RISE * hypot(2 * half[0], 2 * half[1]) + tall
+    rim = show - room
+    bottom = show - stroke - PAD - BELOW
+    x, y = place[0] - at[0] + middle[0], place[1] - at[1] + middle[1]
+    off = at - middle[:2]
+    inside = (
+        float(off[0] - half[0] - PLAY),
+        float(off[0] + half[0] + PLAY),
+        float(off[1] - half[1] - PLAY),
+        float(off[1] + half[1] + PLAY),
+    )
+    box = (
+        x + inside[0] - WALL,
+        x + inside[1] + WALL,
+        y + inside[2] - WALL,
+        y + inside[3] + WALL,
+    )
+    elevation = show - (PAYLOAD + float(low[2] - product.low[2]))
+    feeder = Feeder(0.0, 0.0, inside, box, box, box, max(bottom, FLOOR), rim, -stroke)
+    return Well((float(x), float(y)), elevation, feeder)
+
+
+def shown_height(solids: Sequence[Solid], clearance: float) -> float:
+    """The height at which the bottoms of parts are shown, so that their wells stand on the floor
+    [m]."""
+    tallest = max(float(s.high[2] - s.low[2]) for s in solids)
+    widest = max(hypot(*(s.high - s.low)[:2].tolist()) for s in solids)
+    return FLOOR + BELOW + PAD + clearance / 2 + RISE * widest + tallest

@@ -1,0 +1,125 @@
+"""The curves of all legs of a cell, with the torques that the drives need along them.
+
+The coordinate of a leg is that of its robot's axis: it grows from where the robot places, at the
+robot's reach, to where it takes its parts. A leg that brings a part is followed backwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from factory.api import Array, Index
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.dynamics import scalar_law
+from factory.apps.arms.joint_way import JointWay
+
+SAMPLES = 600
+"""Number of places on a leg at which torques are computed; between them they are interpolated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A leg of a robot.
+
+    Attributes:
+        chain: the arm.
+        way: the curve in joint space.
+        reach: the axis's coordinate where the robot places [m].
+        brings: whether the robot brings a part on it.
+        center: centre of mass of a part in the tool's frame (3,) [m].
+        damping: of the joints (n,) [N m s/rad, N s/m].
+    """
+
+    chain: SerialChain
+    way: JointWay
+    reach: float
+    brings: bool
+    center: Array
+    damping: Array
+
+    def along(self, x: Array) -> Array:
+        """Coordinates of the way at coordinates of the axis [m]."""
+        off = x - self.reach
+        return self.way.length - off if self.brings else off
+
+    @property
+    def sign(self) -> float:
+        """Derivative of the way's coordinate by that of the axis."""
+        return -1.0 if self.brings else 1.0
+
+    def at(self, x: Array) -> tuple[Array, Array, Array]:
+        """Configurations and their derivatives by the axis's coordinate (..., n)."""
+        place, first, second = self.way.at(self.along(x))
+        return place, self.sign * first, second
+
+    @cached_property
+    def laws(self) -> Array:
+        """α, β and γ of the arm alone, and what each kilogram of a part adds to them
+        (SAMPLES, 2, 3, n)."""
+        g, first, second = self.way.at(np.linspace(0.0, self.way.length, SAMPLES))
+        loaded = self.chain.carrying(1.0, self.center, np.zeros((3, 3)))
+        empty = np.stack(scalar_law(self.chain, g, first, second), axis=1)
+        full = np.stack(scalar_law(loaded, g, first, second), axis=1)
+        return np.stack([empty, full - empty], axis=1)
+
+    def force(self, x: Array, v: Array, a: Array, load: float) -> Array:
+        """Torques of the drives (..., n) at coordinates, speeds and accelerations (...)."""
+        at = np.clip(self.along(x) / self.way.length, 0.0, 1.0) * (SAMPLES - 1)
+        low = np.minimum(at.astype(int), SAMPLES - 2)
+        share = (at - low)[..., None, None, None]
+        law = (1 - share) * self.laws[low] + share * self.laws[low + 1]
+        law = law[..., 0, :, :] + load * law[..., 1, :, :]
+        rate, gain = (self.sign * v)[..., None], (self.sign * a)[..., None]
+        first = self.way.at(self.along(x))[1]
+        drag = self.damping * first * rate
+        return law[..., 0, :] * gain + law[..., 1, :] * rate**2 + law[..., 2, :] + drag
+
+
+@dataclass(frozen=True, eq=False)
+class LegTable:
+    """The legs of a cell, by rows: the curves that its arms follow."""
+
+    legs: Sequence[Leg]
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints of an arm."""
+        return len(self.legs[0].chain)
+
+    def at(self, rows: Index, x: Array) -> tuple[Array, Array, Array]:
+        """Places, first and second derivatives (..., m, n) of legs (m,) at coordinates (..., m)
+        [m]."""
+        found = [self.legs[row].at(x[..., k]) for k, row in enumerate(rows.tolist())]
+        g, first, second = (np.stack(each, axis=-2) for each in zip(*found, strict=True))
+        return g, first, second
+
+    def along(
+        self, rows: Index, places: Array, velocities: Array, near: Array
+    ) -> tuple[Array, Array]:
+        """Coordinates (m,) [m] of the points of legs that are nearest to configurations (m, n), and
+        speeds (m,) along the legs of velocities of the joints (m, n)."""
+        x, v = np.empty(len(rows)), np.empty(len(rows))
+        for k, row in enumerate(rows.tolist()):
+            leg = self.legs[row]
+            s, speed = leg.way.along(
+                places[k : k + 1], velocities[k : k + 1], leg.along(near[k : k + 1])
+            )
+            x[k] = leg.reach + (leg.way.length - s[0] if leg.brings else s[0])
+            v[k] = leg.sign * speed[0]
+        return x, v
+
+    def force(
+        self, rows: Index, motion: tuple[Array, Array, Array], mass: Array, load: Array
+    ) -> Array:
+        """Torques (..., m, n) of the drives along legs (m,) at coordinates (..., m), speeds and
+        accelerations, with payloads (m,) [kg]."""
+        x, v, a = motion
+        found = [
+            self.legs[row].force(x[..., k], v[..., k], a[..., k], float(load[k]))
+            for k, row in enumerate(rows.tolist())
+        ]
+        return np.stack(found, axis=-2)
