@@ -220,6 +220,9 @@ RELAY = options(
         multiple=True,
         help="Number of branches that make a label in turn, for example sub2=3 (repeatable).",
     ),
+    click.option(
+        "--arm", metavar="NAME", help="Let an articulated arm place the parts: six, scara."
+    ),
     click.option("--order", metavar="PRODUCT,...", help="Sequence of a mix: truck,truck,van."),
     click.option(
         "--effort",

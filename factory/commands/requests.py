@@ -63,6 +63,7 @@ class ProjectOptions:
     parallel: tuple[tuple[str, int], ...] = ()
     order: str | None = None
     allow: tuple[AllowedOverlap, ...] = ()
+    arm: str | None = None
 
     def settings(self) -> Settings:
         """The settings: from options, else from the environment, else from the plan or, for a PAG,
@@ -90,6 +91,7 @@ class ProjectOptions:
                 "--cycle": self.cycle is not None,
                 "--robots": self.robots is not None,
                 "--platen": self.platen or self.tile is not None,
+                "--arm": self.arm is not None,
                 "--parallel": bool(self.branches()),
                 "[lines]": bool(kept.lines()),
                 "[tees]": bool(kept.tees()),
@@ -127,6 +129,10 @@ class ProjectOptions:
         if self.order is not None:
             project = project.with_pag(project.pag.in_order(self.order.split(",")))
         kept = defaults_for(self.file)
+        if self.arm is not None:
+            from factory.apps.arms.ground import with_arm
+
+            return with_arm(project, self.arm)
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
         from factory.apps.few_robots.sharing import with_branches, with_lines, with_tees
@@ -231,6 +237,7 @@ PLANNED = {
     "platen": "--platen",
     "tile": "--tile",
     "allow": "--allow",
+    "arm": "--arm",
 }
 """The options that a plan already fixes, by their fields."""
 

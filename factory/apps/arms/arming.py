@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from factory.api import Diagnostic, InputError, Plan, Project
+from factory.api import Diagnostic, Factory, InputError, Plan, Project
 from factory.apps.arms.body import STEM_MASS, mass_of
 from factory.apps.arms.read import read_chain
 from factory.theory.lang.template_reader import read_template
@@ -45,9 +45,9 @@ def robot_type(kind: str, file: Path) -> RobotType:
     return RobotType(kind, file, RobotBody(CARRIAGE, mass_of(file), (axis,)), "dot")
 
 
-def armed(project: Project, kind: str) -> Project:
-    """The project in which an arm of a kind places all parts but the first. Raises InputError
-    (NeedsNest) where two sub-assemblies are joined."""
+def armed(project: Project, kind: str, arms: int = 1) -> Project:
+    """The project in which some arms of a kind place all parts but the first, by turns. Raises
+    InputError (NeedsNest) where two sub-assemblies are joined."""
     catalogue, pag = project.catalogue, _placing(project.pag)
     types = {**catalogue.types, kind: robot_type(kind, MODELS / f"{kind}.xml")}
     templates = {**project.templates, "place": read_template(PLACE.format(kind=kind), f"{kind}.op")}
@@ -55,14 +55,21 @@ def armed(project: Project, kind: str) -> Project:
     made = replace(
         project, pag=pag, templates=templates, catalogue=Catalogue(types), lowered=lowered
     )
-    robots = made.compiled.robots
-    turn, crew = list[int](), list[str]()
-    for robot in robots:
-        name = kind if robot.type == kind else f"{robot.name}"
-        if name not in crew:
-            crew.append(name)
-        turn.append(crew.index(name))
-    return made.with_plan(Plan(turns=(tuple(turn),), lifts=frozenset()))
+    return made.with_plan(Plan(turns=(tuple(_crew(made.compiled, kind, arms)),), lifts=frozenset()))
+
+
+def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
+    """The robot (index) that does the tour of each robot of a factory: the carrier the first, tools
+    their own, and arms by turns what is placed."""
+    others = [robot.index for robot in factory.robots if robot.type != kind]
+    placing = [robot for robot in factory.robots if robot.type == kind]
+    order = sorted(placing, key=lambda robot: factory.postorder[robot.operations[-1]])
+    turn = {robot.index: number % arms for number, robot in enumerate(order)}
+    for robot in factory.robots:
+        if robot.index in turn:
+            yield len(others) + turn[robot.index]
+        else:
+            yield others.index(robot.index)
 
 
 def _placing(pag: PAG) -> PAG:

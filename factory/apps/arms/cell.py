@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import cos, hypot, sin
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -16,7 +17,7 @@ import numpy as np
 
 from factory.api import Array, Factory, mujoco
 from factory.apps.arms.body import STEM, Stand, add, standing
-from factory.apps.arms.curves import LegTable
+from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.geometry.suction import pad_place
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
@@ -31,15 +32,8 @@ FLOOR = 0.02
 BELOW = 0.005
 """Between the lowest place of a feeder's pad and the bottom of its well [m]."""
 
-APART = 0.02
-"""Between what stands beside each other [m]."""
-
 PEDESTAL_HEIGHT = 0.10
 """Height of an arm's base [m]."""
-
-NEAR, ROUND = 0.5, 0.52
-"""Shares of an arm's reach: its distance from the station, and that of its feeders."""
-
 
 @dataclass(frozen=True, slots=True)
 class Well:
@@ -118,6 +112,18 @@ class CellChains:
     clear: Mapping[int, float]
     gains: Sequence[tuple[float, float, float]]
     timestep: float = 0.002
+
+    @property
+    def length(self) -> float:
+        """Length of each way [m]."""
+        return self.curves.legs[0].way.length
+
+    @cached_property
+    def sought(self) -> SoughtLegs:
+        """The legs for one who does not know which an arm follows."""
+        return SoughtLegs(
+            [[self.curves.legs[n] for (_, r), n in self.rows.items() if r == robot] for robot in self.robots]
+        )
 
     def row(self, operation: int, robot: int) -> int:
         return self.rows[operation, robot]

@@ -123,3 +123,52 @@ class LegTable:
             for k, row in enumerate(rows.tolist())
         ]
         return np.stack(found, axis=-2)
+
+
+GRID = 200
+"""Number of places on a leg from which the nearest is sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class SoughtLegs:
+    """The legs of arms of which it is not known which they follow: each is on the nearest.
+
+    Attributes:
+        legs: those of each arm.
+    """
+
+    legs: Sequence[Sequence[Leg]]
+
+    @property
+    def dimension(self) -> int:
+        """Number of joints of an arm."""
+        return len(self.legs[0][0].chain)
+
+    @cached_property
+    def _grids(self) -> list[tuple[Array, Array]]:
+        """Configurations (legs, GRID, n) of each arm's legs, and their coordinates (legs, GRID)."""
+        grids = []
+        for legs in self.legs:
+            s = np.linspace(0.0, legs[0].way.length, GRID)
+            grids.append((np.stack([leg.way.at(s)[0] for leg in legs]), np.stack([s] * len(legs))))
+        return grids
+
+    def nearest(self, places: Array) -> tuple[Array, Array]:
+        """Coordinates (b,) [m] of the points of the arms' legs that are nearest to configurations
+        (b, n), and first derivatives there (b, n)."""
+        x, first = np.empty(len(places)), np.empty_like(places)
+        for arm, (q, (grid, s)) in enumerate(zip(places, self._grids, strict=True)):
+            off = np.linalg.norm(grid - q, axis=-1)
+            row, at = np.unravel_index(int(off.argmin()), off.shape)
+            leg = self.legs[arm][int(row)]
+            found, _ = leg.way.nearest(q[None], s[row, at : at + 1])
+            x[arm] = leg.reach + (leg.way.length - found[0] if leg.brings else found[0])
+            first[arm] = leg.at(x[arm : arm + 1])[1][0]
+        return x, first
+
+    def along(
+        self, rows: Index, places: Array, velocities: Array, near: Array
+    ) -> tuple[Array, Array]:
+        """Those coordinates [m] and the speeds (b,) along the legs [m/s]."""
+        x, first = self.nearest(places)
+        return x, (velocities * first).sum(axis=-1) / (first**2).sum(axis=-1)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.api import Array, Factory, Index, names
-from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames
-from factory.floor.layout.way import Ways
+from factory.engine.mjcf.weld_frames import HINGE, SHALLOW, SLIDE, WeldFrames, joints_of
+from factory.floor.layout.chains import SoughtCurves
 
 if TYPE_CHECKING:
     from factory.api import mujoco
@@ -23,8 +23,8 @@ KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 """What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
 the outfeed's tray."""
 
-Bent = tuple[tuple[int, ...], Ways]
-"""The robots (index) whose guidepaths have bends, and the ways that these are."""
+Bent = tuple[tuple[int, ...], SoughtCurves]
+"""The robots (index) whose first axes move several joints, and the curves along which they do."""
 
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others."""
@@ -32,22 +32,22 @@ Holder = tuple[int, int]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BentWays:
-    """The `ways` of the `robots` (b,) whose guidepaths have bends, and the addresses (b, 2) of the
-    positions, speeds and setpoints of their two slides."""
+    """The `ways` of the `robots` (b,) whose first axes move d joints, along bends or chains, and
+    the addresses (b, d) of the positions, speeds and setpoints of these."""
 
     robots: Index
-    ways: Ways
+    ways: SoughtCurves
     slides: Index
     dofs: Index
     drives: Index
 
     @classmethod
-    def of(cls, m: Any, called: list[str], bent: Bent) -> BentWays:
-        """Those of robots `called` in a model. Raises KeyError where it lacks them."""
-        robots, ways = bent
-        moved = [pair for robot in robots for pair in names.along_bends(called[robot])]
-        joints = np.array([m.joint(joint).id for joint, _ in moved], np.intp).reshape(-1, 2)
-        drives = np.array([m.actuator(drive).id for _, drive in moved], np.intp).reshape(-1, 2)
+    def of(cls, m: Any, factory: Factory, bent: Bent) -> BentWays:
+        """Those of a factory's robots in a model. Raises KeyError where it lacks them."""
+        (robots, ways), shape = bent, (-1, bent[1].dimension)
+        moved = [pair for robot in robots for pair in names.moved_along(factory.robots[robot])]
+        joints = np.array([m.joint(joint).id for joint, _ in moved], np.intp).reshape(shape)
+        drives = np.array([m.actuator(drive).id for _, drive in moved], np.intp).reshape(shape)
         return cls(
             np.array(robots, np.intp),
             ways,
@@ -101,8 +101,9 @@ class Anatomy:
         robots = {r.name: r.index for r in factory.robots}
         try:
             slide = [m.joint(names.first_axis(r)).id for r in factory.robots]
-            drive = [m.actuator(names.drive(r)).id for r in robots]
-            ways = BentWays.of(m, [*robots], bent)
+            firsts = factory.axes[: len(factory.robots)]
+            drive = [m.actuator(names.actuator(axis)).id for axis in firsts]
+            ways = BentWays.of(m, factory, bent)
         except KeyError as error:
             raise ValueError(f"the model is not of this factory: {error}") from error
         actuators = range(len(m.actuator_ctrladr))
@@ -149,7 +150,7 @@ def _part(words: list[str]) -> str:
 
 def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     """Raises ValueError where the first body of a weld does more than slide, or turn about the
-    vertical on what slides."""
+    vertical on what slides, and is not at the end of a longer chain of joints."""
     joints, up = m.body_jntnum, m.body_parentid
     first = np.minimum(m.body_jntadr, m.njnt - 1)
     last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
@@ -157,5 +158,7 @@ def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     upright = abs(m.jnt_axis[first, 2]) == 1.0
     turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
     for body in np.unique(m.eq_obj1id[welds]):
+        if len(joints_of(m, int(body))) > SHALLOW:
+            continue
         if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")

@@ -173,11 +173,12 @@ def misplaced(
 ) -> list[int]:
     """The welds (by number) that turn a part, or hold it out of its place in the product relative
     to the other parts of the same holder, for a robot on the same tour. A part alone is turned by
-    the angle at which it is presented, but where a fixed robot delivers it."""
+    the angle at which it is presented, but where a fixed robot delivers it. At the end of a chain
+    of joints a part is as the chain is."""
     factory, inside = subject.factory, subject.factory.contents
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
     wanted = np.tile(UPRIGHT, (len(anatomy.holder), 1))
-    slides = np.zeros((len(anatomy.holder), 2))
+    slides = np.zeros(anatomy.frames.along.shape)
     for weld, holder in enumerate(anatomy.holder):
         part = anatomy.part[weld]
         if holder is None or holder[0] != GRIP:
@@ -189,7 +190,7 @@ def misplaced(
             wanted[weld] = np.cos(half), 0.0, 0.0, np.sin(half)
     wrong, straight = [], _straight(anatomy.frames.turned(slides), wanted, TURNED)
     for weld, holder in enumerate(anatomy.holder):
-        if holder is None or holder[0] not in (GRIP, HOLD):
+        if holder is None or holder[0] not in (GRIP, HOLD) or anatomy.frames.deep[weld]:
             continue
         base, place = anatomy.frames.base[weld], places[anatomy.part[weld]]
         tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0

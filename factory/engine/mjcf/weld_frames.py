@@ -78,7 +78,7 @@ class WeldFrames:
     def _chained(self, m: mujoco.MjModel, d: mujoco.MjData, held: Array, turn: Array) -> WeldFrames:
         """The same with the welds of holders at the end of longer chains, which are at `held`
         (n, 3), turned by `turn` (n, 4) now."""
-        chains = {int(b): _chain(m, int(b)) for b in np.unique(m.eq_obj1id)}
+        chains = {int(b): joints_of(m, int(b)) for b in np.unique(m.eq_obj1id)}
         deep = np.array([len(chains[int(b)]) > SHALLOW for b in m.eq_obj1id], bool)
         if not deep.any():
             return self
@@ -157,7 +157,7 @@ def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, A
     return m.jnt_qposadr[joint], way, d.xanchor[joints[:, 0]], spin
 
 
-def _chain(m: mujoco.MjModel, body: int) -> list[int]:
+def joints_of(m: mujoco.MjModel, body: int) -> list[int]:
     """The joints that slide or turn a body, from the base on."""
     joints = list[int]()
     while body:

@@ -10,6 +10,7 @@ from typing import Any
 
 from factory.engine.record.state import Recordable
 from factory.floor.geometry.fused_bodies import FusedBodies, bodies_of
+from factory.floor.layout.chains import Chains, SoughtCurves
 from factory.floor.layout.exclusions import goes_early
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import Bend, Ways
@@ -45,6 +46,7 @@ class MonitorSubject:
         early: (operation, robot) where a robot goes ahead regardless of the settings, so that its
             hand is out of the way.
         bends: by robot (index), the bends of its guidepath and their rounding [m].
+        chains: the robots whose first axes move several joints; None where there are none.
         word: the units that are made; None for all.
     """
 
@@ -59,6 +61,7 @@ class MonitorSubject:
     early: frozenset[tuple[int, int]] = frozenset()
     bends: Mapping[int, Bent] = field(default_factory=dict, repr=False)
     word: Word | None = None
+    chains: Chains | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         for name in ("places", "bends"):
@@ -99,7 +102,7 @@ class MonitorSubject:
         if bent:
             bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
             subject = replace(subject, bends=bends)
-        return subject
+        return replace(subject, chains=layout.chains)
 
     @classmethod
     def of_run(cls, simulation: Recordable) -> MonitorSubject:
@@ -116,8 +119,11 @@ class MonitorSubject:
         return replace(subject, word=simulation.word) if demanded else subject
 
     @cached_property
-    def bent(self) -> tuple[tuple[int, ...], Ways]:
-        """The robots (index) whose guidepaths have bends, and the ways that these are."""
+    def bent(self) -> tuple[tuple[int, ...], SoughtCurves]:
+        """The robots (index) whose first axes move several joints, and the curves along which they
+        do: of chains, or else of guidepaths with bends."""
+        if self.chains is not None:
+            return self.chains.robots, self.chains.sought
         rows = [*self.bends.values()]
         return (*self.bends,), Ways.of([row for row, _ in rows], [round_ for _, round_ in rows])
 

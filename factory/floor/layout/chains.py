@@ -41,17 +41,37 @@ class JointCurves(Protocol):
         with these payloads (m,) [kg; N, N m]."""
 
 
+class SoughtCurves(Protocol):
+    """Curves in a joint space of d dimensions, of b robots of which it is not known where on their
+    curves they are."""
+
+    @property
+    def dimension(self) -> int:
+        """d."""
+
+    def nearest(self, places: Array) -> tuple[Array, Array]:
+        """The coordinates (b,) of the points of the robots' curves that are nearest to places
+        (b, d), and first derivatives (b, d) there."""
+
+    def along(
+        self, rows: Index, places: Array, velocities: Array, near: Array
+    ) -> tuple[Array, Array]:
+        """Those coordinates and the speeds (b,) along the curves of velocities (b, d)."""
+
+
 class Chains(Protocol):
     """What a layout says of its robots whose first axes move several joints.
 
     Attributes:
         robots: the robots (index).
         curves: the curves of all of them.
+        sought: the same for one who does not know which of them each follows.
         timestep: longest timestep with which their drives follow them [s].
     """
 
     robots: tuple[int, ...]
     curves: JointCurves
+    sought: SoughtCurves
     timestep: float
 
     def row(self, operation: int, robot: int) -> int:

@@ -11,7 +11,6 @@ from factory.floor.layout.chains import Chains, JointCurves
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
-from factory.theory.plant.operation import Operation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,16 +56,13 @@ class Curves:
         now, at = np.arange(len(axes)), np.array([layout.guidepaths[r].length for r in robots])
         made = cls(axes, ways, layout.chains, now, at, row, qpos, dof, further)
         for robot in robots:
-            made.take(layout.factory.first(robot))
+            made.take(robot, layout.factory.first(robot).index)
         return made
 
-    def take(self, operation: Operation) -> None:
-        """Let the robots of an operation follow its curves."""
-        if self.chains is None:
-            return
-        for robot in operation.robots:
-            if self.row[robot] >= 0:
-                self.now[self.row[robot]] = self.chains.row(operation.index, robot)
+    def take(self, robot: int, operation: int) -> None:
+        """Let a robot (index) follow its curve of an operation (index)."""
+        if self.chains is not None and self.row[robot] >= 0:
+            self.now[self.row[robot]] = self.chains.row(operation, robot)
 
     def among(self, axes: Index) -> tuple[Index, Index]:
         """Which of some axes move several joints, and their rows."""

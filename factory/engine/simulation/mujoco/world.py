@@ -156,7 +156,6 @@ class MujocoWorld:
         """Hand the parts of ended operations over: welds off and on in one tick."""
         for operation, unit in started:
             self.inspection.joining[operation.index] = unit
-            self.motion.axes.curves.take(operation)
         if ended:
             self._hand_over(ended)
             self.hooks.tell_ended()
@@ -165,6 +164,9 @@ class MujocoWorld:
         self.parts.complete(ended)
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)
+            for robot in operation.robots:
+                after = self.model.factory.after(robot, operation.index)
+                self.motion.axes.curves.take(robot, after)
             if self.model.factory.drops(operation.index):
                 self.inspection.measure(unit, *self.parts.finished(unit))
                 self.motion.send_tray(True)

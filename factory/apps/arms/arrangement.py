@@ -1,0 +1,303 @@
+"""Where things stand in a cell: the carrier's line and its station, arms on either side of it, and
+the feeders of each arm on a circle round its base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import asin, cos, pi, radians, sin
+
+import numpy as np
+
+from factory.api import Array, Diagnostic, Factory, Layout, RunError
+from factory.apps.arms.body import PEDESTAL, STEM, Stand
+from factory.apps.arms.cell import PEDESTAL_HEIGHT, Well, down, shown_height, tip_on, well_of
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.scene import Obstacle
+from factory.floor.geometry.solids import Product
+from factory.floor.layout.dimensions import PAYLOAD
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.guidepath import Box, Guidepath
+
+POINTING_DOWN = 0.72
+"""How far from its axis a tool that points down comes, as a share of the chain's length."""
+
+NEAR, ROUND = 0.5, 0.52
+"""Shares of that: the distance of an arm from the station, and that of its feeders."""
+
+PRIVATE = radians(72.0)
+"""Least angle between the station and a feeder, as an arm sees them, where there is another arm:
+ways nearer to the station are near those of the other for all of their length [rad]."""
+
+APART = 0.02
+"""Between what stands beside each other [m]."""
+
+LANE = 0.32
+"""From the station to either end of the carrier's line, without the product's length [m]."""
+
+ABOVE = 0.022
+"""How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""
+
+OVER_WELL = 0.06
+"""How far a tool goes straight up from a feeder at least [m]."""
+
+STRAIGHT = 0.5
+"""Share of a straight end that stays straight where the leg is rounded (`legs.leg`)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arrangement:
+    """The places in a cell.
+
+    Attributes:
+        factory: the factory; its first robot is the carrier, all others are arms.
+        rails: the layout of the same product on rails, whose carrier's line and hand it takes.
+        chain: the arms, to the tip of their tools.
+    """
+
+    factory: Factory
+    rails: Layout
+    chain: SerialChain
+
+    @property
+    def product(self) -> Product:
+        """The solids."""
+        return self.rails.product
+
+    @property
+    def arms(self) -> range:
+        """The arms (index)."""
+        return range(1, len(self.factory.robots))
+
+    def labels(self, arm: int) -> list[str]:
+        """The parts that an arm takes, in the order of its program."""
+        operations = self.factory.operations
+        return [operations[tour[0]].label for tour in self.factory.tours[arm]]
+
+    @cached_property
+    def arm_of(self) -> dict[str, int]:
+        """The arm (index) that takes each part."""
+        return {label: arm for arm in self.arms for label in self.labels(arm)}
+
+    @cached_property
+    def half(self) -> Array:
+        """Half the length and half the width of the product (2,) [m]."""
+        return np.asarray((self.product.high - self.product.low)[:2] / 2)
+
+    @cached_property
+    def lane(self) -> float:
+        """From the station to either end of the carrier's line [m]."""
+        return round(LANE + 2 * float(self.half[0]), 3)
+
+    @cached_property
+    def line(self) -> Guidepath:
+        """The carrier's guidepath, its station in the middle."""
+        return replace(self.rails.guidepaths[0], travel=2 * self.lane)
+
+    @cached_property
+    def station(self) -> tuple[float, float]:
+        """The product's middle at the station [m]."""
+        return self.line.middle(self.line.reach + self.lane)
+
+    @cached_property
+    def far(self) -> float:
+        """How far an arm's tool comes from its axis, pointing down [m]."""
+        return self.chain.length * POINTING_DOWN
+
+    @cached_property
+    def stands(self) -> dict[int, Stand]:
+        """Where the arms stand, to the left and right of the line in turn."""
+        if len(self.arms) > len(SIDES):
+            message = f"{len(self.arms)} arms have no room at one station"
+            raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
+        (x, y), off = self.station, NEAR * self.far
+        return {
+            arm: Stand((x, y + side * off, PEDESTAL_HEIGHT), -side * pi / 2)
+            for arm, side in zip(self.arms, SIDES, strict=False)
+        }
+
+    @cached_property
+    def wells(self) -> dict[str, Well]:
+        """The feeders of all arms."""
+        solids = [self.product.solids[label] for label in self.arm_of]
+        show = shown_height(solids, self.rails.clearance)
+        return {
+            label: well_of(self.product, self.product.solids[label], at, show, self.rails.clearance)
+            for arm in self.arms
+            for label, at in self._places(arm)
+        }
+
+    def _places(self, arm: int) -> Iterator[tuple[str, tuple[float, float]]]:
+        """Where the parts of an arm are shown: on a circle round it, to the right and left of the
+        station in turn, the first ones next to the carrier's line."""
+        stand, radius = self.stands[arm], ROUND * self.far
+        beside = max(float(self.half[1]), self.factory.carriage / 2) + self.rails.clearance
+        angles = [0.0, 0.0]
+        for number, label in enumerate(self.labels(arm)):
+            solid = self.product.solids[label]
+            wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
+            pitch = asin(min(1.0, wide / radius))
+            room = (NEAR * self.far - beside - wide) / radius
+            first = pi / 2 - asin(max(-1.0, min(1.0, room)))
+            first = max(first, PRIVATE * (len(self.arms) > 1))
+            side = number % 2
+            angle = max(angles[side] + pitch, first)
+            angles[side] = angle + pitch
+            if angles[side] > pi - 0.1:
+                message = f"the feeder of '{label}' has no room round its arm"
+                hint = "more arms, smaller parts, or rails: leave out --arm"
+                raise RunError(Diagnostic("Layout", message, None, hint))
+            turned = stand.yaw + (angle if side else -angle)
+            x, y, _ = stand.place
+            yield label, (x + radius * cos(turned), y + radius * sin(turned))
+
+    @cached_property
+    def tip(self) -> dict[str, Array]:
+        """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
+        return {label: tip_on(self.product.solids[label]) for label in self.arm_of}
+
+    @property
+    def _foot(self) -> Array:
+        """The place in the product's frame that comes to where the product's middle is, on the
+        floor (3,) [m]."""
+        return np.array([*self.product.middle[:2], self.product.low[2] - PAYLOAD])
+
+    def shown(self, label: str) -> Array:
+        """How far a part is from its place in the product's frame as it is shown (3,) [m]."""
+        well = self.wells[label]
+        return np.array([*well.place, well.elevation]) - self._foot
+
+    @property
+    def placed(self) -> Array:
+        """How far a part is from its place in the product's frame at the station (3,) [m]."""
+        return np.array([*self.station, 0.0]) - self._foot
+
+    def local(self, arm: int, place: Array) -> Array:
+        """A place of the world in the frame of an arm's base (3,) [m]."""
+        stand = self.stands[arm]
+        c, s = cos(-stand.yaw), sin(-stand.yaw)
+        x, y, z = place - stand.place
+        return np.array([c * x - s * y, s * x + c * y, z])
+
+    @cached_property
+    def top(self) -> float:
+        """Height of the product's top [m]."""
+        return PAYLOAD + float(self.product.high[2] - self.product.low[2])
+
+    def rises(self, label: str) -> float:
+        """How far above its place the tool begins to come straight down with a part: it is still
+        where a carrier may come and go at the end of what is rounded [m]."""
+        solid, o = self.product.solids[label], self.factory.by_label[label]
+        bottom = PAYLOAD + float(solid.low[2] - self.product.low[2])
+        parent = self.factory.operations[self.factory.parents[o.index]]
+        stroke = parent.approach.stroke if parent.approach else 0.0
+        return max(stroke, self.top - bottom + ABOVE) / STRAIGHT
+
+    def leaves(self, label: str) -> float:
+        """How far the empty tool goes straight up from where it has placed a part [m]."""
+        return (self.top + ABOVE - float(self.tip[label][2] + self.placed[2])) / STRAIGHT
+
+    @cached_property
+    def over_well(self) -> float:
+        """How far the tool goes straight up from a feeder [m]."""
+        solids = self.product.solids
+        show = min(float(solids[label].low[2] + self.shown(label)[2]) for label in self.arm_of)
+        return max(OVER_WELL, self.top + 2 * ABOVE - show)
+
+    def loads(self, label: str) -> list[tuple[Array, Array, Array]]:
+        """The boxes of a part in the tool's frame, held with the tool's angle at 0: place, half
+        sizes, quaternion."""
+        solid = self.product.solids[label]
+        middle, half = (solid.low + solid.high) / 2, (solid.high - solid.low) / 2
+        place = down(0.0).T @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
+        return [(place, half, np.array([0.0, 1.0, 0.0, 0.0]))]
+
+    def obstacles(self, arm: int, bare: Layout) -> Iterator[Obstacle]:
+        """What stands in an arm's way, or may come there while it is on a transfer.
+
+        Args:
+            arm: the arm (index).
+            bare: the layout without legs.
+        """
+        yield Obstacle("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
+        yield from self._carrier()
+        for label, well in self.wells.items():
+            xlo, xhi, ylo, yhi = well.feeder.housing
+            yield Obstacle(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
+            yield self._part(f"'{label}'", label, self.shown(label))
+        for label in self.product.solids:
+            yield self._part(placed_name(label), label, self.placed)
+        first = self.factory.first(0).label
+        feeder = feeder_of(bare, first)
+        for name, box, bottom in (
+            ("post", feeder.post, 0.0),
+            ("boom", feeder.boom, feeder.low),
+            ("housing", feeder.housing, feeder.low),
+        ):
+            yield _upright(f"the {name} of '{first}'", box, bottom, feeder.high)
+        shed = (bare.shed[0], bare.shed[1], bare.shed[2], bare.shed[3])
+        yield _upright("the outfeed's shed", shed, 0.0, self.top + 0.06)
+        yield _upright("the outfeed", bare.outfeed, 0.0, self.top)
+        for other, stand in self.stands.items():
+            if other != arm:
+                x, y, z = stand.place
+                box = (x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL)
+                name = self.factory.robots[other].name
+                yield _upright(f"the base of {name}", box, 0.0, z + BASE)
+
+    def _carrier(self) -> Iterator[Obstacle]:
+        """All that the carrier takes with the product on its line."""
+        ends = [self.line.middle(x) for x in (self.line.reach, self.line.length)]
+        low, high = sorted(end[0] for end in ends)
+        side = max(float(self.half[1]), self.factory.carriage / 2)
+        half, y = float(self.half[0]), ends[0][1]
+        back = max(half, self.line.reach + self.factory.carriage / 2)
+        yield _upright(CARRIER, (low - back, high + half, y - side, y + side), 0.0, self.top)
+
+    def _part(self, name: str, label: str, off: Array) -> Obstacle:
+        solid = self.product.solids[label]
+        low, high = (tuple(map(float, end + off)) for end in (solid.low, solid.high))
+        return Obstacle(name, (low[0], low[1], low[2]), (high[0], high[1], high[2]))
+
+    @cached_property
+    def floor(self) -> Box:
+        """The floor that the cell takes [m]."""
+        xlo, xhi, ylo, yhi = self.rails.floor
+        boxes = [well.feeder.housing for well in self.wells.values()]
+        for stand in self.stands.values():
+            x, y, _ = stand.place
+            boxes.append((x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL))
+        ahead = self.line.middle(self.line.length)[0]
+        c, back = self.rails.clearance, xlo - self.rails.guidepaths[0].travel * 0
+        behind = ahead - (self.rails.guidepaths[0].middle(self.rails.guidepaths[0].length)[0] - back)
+        return (
+            float(min(behind, *(b[0] for b in boxes))) - c,
+            float(max(xhi, *(b[1] for b in boxes))) + c,
+            float(min(ylo, *(b[2] for b in boxes))) - c,
+            float(max(yhi, *(b[3] for b in boxes))) + c,
+        )
+
+
+SIDES = (1.0, -1.0)
+"""The sides of the line on which arms stand."""
+
+BASE = 0.24
+"""Height of what of an arm stands above its pedestal, at least [m]."""
+
+CARRIER = "the carrier"
+
+
+def feeder_name(label: str) -> str:
+    """What the feeder of a part is called."""
+    return f"the feeder of '{label}'"
+
+
+def placed_name(label: str) -> str:
+    """What a part in the product is called."""
+    return f"'{label}' in the product"
+
+
+def _upright(name: str, box: Box, low: float, high: float) -> Obstacle:
+    xlo, xhi, ylo, yhi = map(float, box)
+    return Obstacle(name, (xlo, ylo, float(low)), (xhi, yhi, float(high)))

@@ -1,0 +1,82 @@
+"""The project of a cell: the factory of an arm with the ground that it is laid out on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+from factory.api import Factory, Layout, Product, Project, Settings, usage_error
+from factory.apps.arms.arming import MODELS, armed
+from factory.apps.arms.joint_way import WayLimits
+from factory.floor.layout.request import Ground
+
+KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
+"""The arms that are shipped."""
+
+
+@dataclass(frozen=True, slots=True)
+class CellGround(Ground):
+    """The floor of a cell.
+
+    Attributes:
+        kind: the arm.
+        rails: the project of the same product on rails, from which the carrier's line is taken.
+    """
+
+    kind: str = ""
+    rails: Project | None = field(default=None, compare=False, repr=False)
+
+    def lay_out(
+        self, factory: Factory, product: Product, settings: Settings, *_: Any
+    ) -> Layout:
+        """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
+        from factory.apps.arms.laying import Arm, laid_out
+        from factory.floor.geometry.fused_bodies import repeated
+        from factory.floor.mating.mating import judged
+
+        assert self.rails is not None
+        factory, product = judged(factory, product), repeated(product, factory)
+        rails = self.rails.with_settings(settings).layout
+        pace = WayLimits(settings.speed, settings.acceleration)
+        return laid_out(factory, rails, Arm.of(MODELS / f"{self.kind}.xml"), pace)
+
+
+class CellProject(Project):
+    """The project of a product that is made by a cell."""
+
+    @cached_property
+    def hands(self) -> Any:
+        """The hands of the carrier are chosen on rails; an arm has a tool of its own."""
+        assert isinstance(self.ground, CellGround) and self.ground.rails is not None
+        return self.ground.rails.hands
+
+    @cached_property
+    def no_grips(self) -> tuple[()]:
+        """What an arm cannot hold is found as its cell is laid out."""
+        return ()
+
+
+def with_arm(project: Project, asked: str) -> Project:
+    """The project in which arms place all parts but the first.
+
+    Args:
+        project: of the product.
+        asked: the kind of arm, or `KIND=NUMBER` for several.
+
+    Raises InputError: Usage for an unknown kind, NeedsNest where two sub-assemblies are joined.
+    """
+    kind, _, number = asked.partition("=")
+    if kind not in KINDS:
+        raise usage_error(f"there is no arm '{kind}'", f"arms: {', '.join(KINDS)}")
+    if number not in ("", "1", "2"):
+        raise usage_error(f"--arm {asked}: a cell has one arm or two", f"--arm {kind}=2")
+    made = armed(project, kind, int(number or 1))
+    nodes = tuple(
+        replace(node, operation="insert") if len(node.inputs) > 1 else node
+        for node in made.pag.nodes
+    )
+    rails = project.with_pag(replace(project.pag, nodes=nodes))
+    values = {name: getattr(made, name) for name in made.__dataclass_fields__}
+    ground = CellGround(project.ground.floor, kind=kind, rails=rails)
+    return CellProject(**{**values, "ground": ground})

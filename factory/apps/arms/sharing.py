@@ -1,0 +1,98 @@
+"""What two arms at one station share: how far one must have gone before the other may come.
+
+A link is taken for a capsule that contains it, a payload for a ball.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.api import Array, mujoco
+from factory.apps.arms.joint_way import JointWay
+from factory.apps.arms.scene import Scene
+
+SAMPLES = 64
+"""Number of places on a way."""
+
+BETWEEN = 0.03
+"""Distance of two arms at the samples [m]: what they go between two of them is less than a third
+of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swept:
+    """The capsules of an arm on a way.
+
+    Attributes:
+        ends: of their axes (SAMPLES, k, 2, 3) [m].
+        radius: (k,) [m].
+    """
+
+    ends: Array
+    radius: Array
+
+    @classmethod
+    def of(cls, scene: Scene, way: JointWay, label: str = "") -> Swept:
+        """Those of an arm on a way, with a part that it holds."""
+        m, d = scene.m, scene.d
+        geoms = [*scene.links, *scene.loads.get(label, ())]
+        balls = np.isin(geoms, [*scene.loads.get(label, ())])
+        long = np.where(balls, 0.0, np.where(m.geom_type[geoms] == BALL, 0.0, m.geom_size[geoms, 1]))
+        radius = np.where(balls, m.geom_rbound[geoms], m.geom_size[geoms, 0])
+        rows = []
+        for q in way.at(np.linspace(0.0, way.length, SAMPLES))[0]:
+            d.qpos[:] = q
+            mujoco.mj_kinematics(m, d)
+            axis = d.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2] * long[:, None]
+            middle = d.geom_xpos[geoms]
+            rows.append(np.stack([middle - axis, middle + axis], axis=1))
+        return cls(np.array(rows), radius)
+
+
+BALL = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+
+
+def clear_from(leaves: Swept, others: Sequence[Swept]) -> float | None:
+    """From which share of its way on an arm is clear of others wherever these are on theirs; None
+    where it is not even at its end."""
+    near = np.zeros(SAMPLES, bool)
+    for other in others:
+        for k in range(SAMPLES):
+            near[k] |= _nearer(leaves, k, other)
+    if near[-1]:
+        return None
+    last = np.flatnonzero(near)
+    return 0.0 if not len(last) else float((last[-1] + 1) / (SAMPLES - 1))
+
+
+def _nearer(one: Swept, row: int, other: Swept) -> bool:
+    """Whether an arm at a sample comes nearer to another than it may, wherever that is."""
+    a, b = one.ends[row], other.ends.reshape(-1, 2, 3)
+    radius = np.tile(other.radius, SAMPLES)
+    middle = b.mean(axis=1)
+    reach = np.linalg.norm(b[:, 1] - b[:, 0], axis=1) / 2 + radius
+    for ends, r in zip(a, one.radius, strict=True):
+        far = np.linalg.norm(middle - ends.mean(axis=0), axis=1) - reach
+        close = far - np.linalg.norm(ends[1] - ends[0]) / 2 - r < BETWEEN
+        if close.any():
+            gap = _distances(ends, b[close]) - radius[close] - r
+            if (gap < BETWEEN).any():
+                return True
+    return False
+
+
+def _distances(a: Array, b: Array) -> Array:
+    """Distances (m,) of a segment (2, 3) from segments (m, 2, 3) [m]."""
+    u, v = a[1] - a[0], b[:, 1] - b[:, 0]
+    w = a[0] - b[:, 0]
+    uu, vv, uv = float(u @ u), (v * v).sum(axis=1), v @ u
+    uw, vw = w @ u, (v * w).sum(axis=1)
+    det = uu * vv - uv**2
+    s = np.clip(np.where(det > 1e-12, (uv * vw - vv * uw) / np.maximum(det, 1e-12), 0.0), 0.0, 1.0)
+    t = np.clip((uv * s + vw) / np.maximum(vv, 1e-12), 0.0, 1.0)
+    s = np.clip((uv * t - uw) / max(uu, 1e-12), 0.0, 1.0)
+    off = w + s[:, None] * u - t[:, None] * v
+    return np.asarray(np.linalg.norm(off, axis=1))
