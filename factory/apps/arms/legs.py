@@ -1,4 +1,4 @@
-"""Legs: ways of an arm from one visit to the next, and the configurations of visits round a circuit.
+"""Legs: ways of an arm from one visit to the next.
 
 A leg leaves a visit along a straight line, crosses clear of everything that stands, and comes to
 the next visit along a straight line. It crosses along the straight joint line where that is clear,
@@ -9,17 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Array, Index, Truth
+from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.inverse import (
-    SINGULAR,
-    descend,
-    in_range,
-    least_singular_value,
-)
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.slowness import way_through
 
@@ -44,9 +39,6 @@ ROUNDINGS = 0.1, 0.05, 0.025, 0.0125
 
 CHECKS = 150
 """Number of configurations of a way that are asked for their clearance."""
-
-CROSSING = 0.02
-"""Along the joint line within a branch no least singular value is below this."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +125,7 @@ def transfer(
     if path is None:
         return search.no_way()
     path = search.shortened(path, rng)
-    rows = [line(p, q)[1:] for p, q in zip(path, path[1:], strict=False)]
+    rows = [line(p, q)[1:] for p, q in pairwise(path)]
     return np.concatenate([a[None], *rows])
 
 
@@ -185,7 +177,7 @@ def leg(
     into: Array,
     clearance: Clearance,
     ends: Clearance,
-    pace: WayLimits = WayLimits(),
+    pace: WayLimits,
     seed: int = 0,
 ) -> JointWay | NoWay:
     """The way from one visit to the next, or why there is none.
@@ -230,55 +222,3 @@ def obstruction(way: JointWay, clearance: Clearance, ends: Clearance) -> NoWay |
     if margin.min() >= 0.0:
         return None
     return NoWay(int(pair[margin.argmin()]), -float(margin.min()), int((margin < 0.0).sum()))
-
-
-def partners(chain: SerialChain, q: Array, place: Array, turn: Array) -> tuple[Array, Truth]:
-    """The configurations (k, n) that bring the tool to a second pose on the branch of those that
-    have it at a first one, and whether there is one (k,): both, and the joint line between them,
-    stay away from singular configurations.
-
-    Args:
-        chain: the arm.
-        q: configurations at the first pose (k, n) [rad, m].
-        place: of the tool at the second pose (3,) or (k, 3) [m].
-        turn: orientation of the tool there (3, 3) or (k, 3, 3).
-    """
-    other, there = descend(chain, place, turn, q, 80)
-    other, inside = in_range(chain, other, q)
-    share = np.linspace(0.0, 1.0, 9)[:, None, None]
-    values = least_singular_value(chain, q + share * (other - q))
-    good = there & inside & (np.minimum(values[0], values[-1]) >= SINGULAR)
-    return other, good & (values.min(axis=0) >= CROSSING)
-
-
-def circuit(options: Sequence[Array], speed: Array) -> list[int]:
-    """Which configurations to use for each tour of a circuit: those of least total time, by dynamic
-    programming. A leg costs the time of its slowest joint, and a twentieth of that of all.
-
-    Args:
-        options: for each tour in turn, pairs of configurations where it takes its part and where it
-            places it (k, 2, n), at least one [rad, m].
-        speed: greatest speed of the joints (n,) [rad/s, m/s].
-    """
-
-    def cost(a: Array, b: Array) -> Array:
-        time = np.abs(b - a) / speed
-        return np.asarray(time.max(axis=-1) + 0.05 * time.sum(axis=-1))
-
-    brings = [cost(pairs[:, 0], pairs[:, 1]) for pairs in options]
-    goes = [
-        cost(one[:, None, 1], other[None, :, 0])
-        for one, other in zip(options, [*options[1:], options[0]], strict=True)
-    ]
-    total = np.where(np.eye(len(options[0]), dtype=bool), brings[0], np.inf)
-    before: list[Index] = []
-    for way, load in zip(goes[:-1], brings[1:], strict=True):
-        every = total[:, :, None] + way
-        before.append(every.argmin(axis=1))
-        total = every.min(axis=1) + load
-    total += goes[-1].T
-    first, last = np.unravel_index(int(total.argmin()), total.shape)
-    chosen = [int(last)]
-    for back in reversed(before):
-        chosen.append(int(back[first, chosen[-1]]))
-    return chosen[::-1]

@@ -17,6 +17,9 @@ import numpy as np
 from factory.api import Array, Diagnostic, InputError, Position, mujoco, rotation
 from factory.apps.arms.chain import ConvexBody, JointLimits, LinkInertia, SerialChain, steiner
 
+MODELS = Path(__file__).parent / "mjcf"
+"""Where the arms of the catalogue are."""
+
 SIDES = 16
 """Number of sides of the prism round a cylinder."""
 
@@ -228,7 +231,7 @@ class _Reading:
         bodies = [b for b, k in enumerate(frames) if k == frame]
         mass = m.body_mass[bodies]
         at = np.array([self.place[b] + self.turn[b] @ m.body_ipos[b] for b in bodies])
-        at = (at - place) @ turn
+        at = (at.reshape(-1, 3) - place) @ turn
         weight = mass * (1 - m.body_gravcomp[bodies])
         center = mass @ at / max(float(mass.sum()), 1e-300)
         moment = np.zeros((3, 3))
@@ -240,9 +243,7 @@ class _Reading:
         middle = weight @ at / total if abs(total) > 1e-12 else np.zeros(3)
         return float(mass.sum()), center, moment, total, middle
 
-    def _bodies(
-        self, frames: Sequence[int], place: Array, turn: Array
-    ) -> list[ConvexBody]:
+    def _bodies(self, frames: Sequence[int], place: Array, turn: Array) -> list[ConvexBody]:
         """The convex bodies of what can touch; of all geoms of the arm, if none can."""
         m = self.m
         endless = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -281,7 +282,7 @@ def _convex(m: mujoco.MjModel, geom: int) -> tuple[Array, float]:
 
 
 def _hull(m: mujoco.MjModel, mesh: int) -> Array:
-    """The vertices (k, 3) of a mesh's convex hull; all of its vertices where the engine has none."""
+    """The vertices (k, 3) of a mesh's convex hull; all of them where the engine made no hull."""
     start = int(m.mesh_vertadr[mesh])
     vertices = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
     graph = int(m.mesh_graphadr[mesh])
@@ -290,5 +291,3 @@ def _hull(m: mujoco.MjModel, mesh: int) -> Array:
     count = int(m.mesh_graph[graph])
     corners = m.mesh_graph[graph + 2 + count : graph + 2 + 2 * count]
     return np.asarray(vertices[corners])
-
-

@@ -1,0 +1,146 @@
+"""Configurations of an arm for its visits: candidates for each tour, and the best round a circuit.
+
+A tour takes a part at one pose and places it at another. Its two configurations are on one branch:
+the joint line between them stays away from singular configurations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.api import Array, Index, Truth
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.inverse import (
+    SINGULAR,
+    away,
+    descend,
+    in_range,
+    least_singular_value,
+    solutions,
+    straight,
+)
+from factory.apps.arms.legs import Clearance, NoWay
+
+CROSSING = 0.02
+"""Along the joint line within a branch no least singular value is below this."""
+
+EVERY_JOINT = 0.05
+"""Weight of the time of all joints beside that of the slowest."""
+
+
+def partners(chain: SerialChain, q: Array, place: Array, turn: Array) -> tuple[Array, Truth]:
+    """The configurations (k, n) that bring the tool to a second pose on the branch of those that
+    have it at a first one, and whether there is one (k,): both, and the joint line between them,
+    stay away from singular configurations.
+
+    Args:
+        chain: the arm.
+        q: configurations at the first pose (k, n) [rad, m].
+        place: of the tool at the second pose (3,) or (k, 3) [m].
+        turn: orientation of the tool there (3, 3) or (k, 3, 3).
+    """
+    other, there = descend(chain, place, turn, q, 80)
+    other, inside = in_range(chain, other, q)
+    share = np.linspace(0.0, 1.0, 9)[:, None, None]
+    values = least_singular_value(chain, q + share * (other - q))
+    good = there & inside & (np.minimum(values[0], values[-1]) >= SINGULAR)
+    return other, good & (values.min(axis=0) >= CROSSING)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Candidates:
+    """Configurations with which an arm can take a part at one pose and place it at another.
+
+    Attributes:
+        pairs: where it takes it and where it places it (k, 2, n) [rad, m].
+        grips: number of the pair of poses that each belongs to (k,).
+        reached: how many configurations came to both, clear or not.
+        blocked: what most of those that are not clear are too near to; None if all are clear.
+    """
+
+    pairs: Array
+    grips: Index
+    reached: int
+    blocked: NoWay | None
+
+
+def candidates(
+    chain: SerialChain,
+    takes: tuple[Array, Array],
+    puts: tuple[Array, Array],
+    clearance: Clearance,
+    near: Array,
+    length: float,
+) -> Candidates:
+    """The candidates for a tour whose part may be held in m ways.
+
+    Args:
+        chain: the arm.
+        takes: places (m, 3) [m] and orientations (m, 3, 3) of the tool where it takes the part.
+        puts: those where it places it.
+        clearance: of configurations at both, and at the far ends of the straight lines there.
+        near: a configuration; of those that whole turns make equal, the nearest is used [rad, m].
+        length: of the straight lines, along the tool [m].
+    """
+    every = solutions(chain, *takes)
+    grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
+    q, good = in_range(chain, np.concatenate(every), near)
+    other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
+    joined &= good
+    grips, q, other = grips[joined], q[joined], other[joined]
+    visits = np.concatenate([q, other])
+    lines, straights = straight(chain, visits, away(chain, visits), length)
+    follows = straights.reshape(2, -1).all(axis=0)
+    ends = np.concatenate([lines[:, 0], lines[:, -1]])
+    margins, numbers = clearance(ends)
+    margin, pair = margins.reshape(4, -1)[:, follows], numbers.reshape(4, -1)[:, follows]
+    clear = margin.min(axis=0, initial=np.inf) >= 0.0
+    pairs = np.stack([q, other], axis=1)[follows]
+    blocked = _blocked(margin[:, ~clear], pair[:, ~clear])
+    return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
+
+
+def _blocked(margin: Array, pair: Index) -> NoWay | None:
+    """What columns of margins and pairs (4, k) say that is too near."""
+    if not margin.size:
+        return None
+    worst = margin.argmin(axis=0), np.arange(margin.shape[1])
+    counts = np.bincount(pair[worst])
+    most = int(counts.argmax())
+    return NoWay(most, -float(margin[worst][pair[worst] == most].min()), int(counts[most]))
+
+
+def circuit(options: Sequence[Array], speed: Array) -> list[int]:
+    """Which configurations to use for each tour of a circuit: those of least total time, by dynamic
+    programming. A leg costs the time of its slowest joint, and a twentieth of that of all.
+
+    Args:
+        options: for each tour in turn, pairs of configurations where it takes its part and where it
+            places it (k, 2, n), at least one [rad, m].
+        speed: greatest speed of the joints (n,) [rad/s, m/s].
+    """
+
+    def cost(a: Array, b: Array) -> Array:
+        time = np.abs(b - a) / speed
+        return np.asarray(time.max(axis=-1) + EVERY_JOINT * time.sum(axis=-1))
+
+    brings = [cost(pairs[:, 0], pairs[:, 1]) for pairs in options]
+    goes = [
+        cost(one[:, None, 1], other[None, :, 0])
+        for one, other in zip(options, [*options[1:], options[0]], strict=True)
+    ]
+    total = np.where(np.eye(len(options[0]), dtype=bool), brings[0], np.inf)
+    before: list[Index] = []
+    for way, load in zip(goes[:-1], brings[1:], strict=True):
+        every = total[:, :, None] + way
+        before.append(every.argmin(axis=1))
+        total = every.min(axis=1) + load
+    total += goes[-1].T
+    first, last = np.unravel_index(int(total.argmin()), total.shape)
+    chosen = [int(last)]
+    for back in reversed(before):
+        chosen.append(int(back[first, chosen[-1]]))
+    return chosen[::-1]
