@@ -91,13 +91,14 @@ def configurations(chain: SerialChain, count: int, seed: int) -> Array:
     return np.asarray(rng.uniform(low, high, (count, len(chain))))
 
 
-def random_way(chain: SerialChain, seed: int, knots: int = 8) -> JointWay:
-    """A way through random configurations, as short as the limits of the joints let it be."""
+def random_way(chain: SerialChain, seed: int, share: float = 1.0) -> JointWay:
+    """A way through 8 random configurations in a share of the joints' ranges, as short as their
+    limits let it be."""
     rng = np.random.default_rng(seed)
-    x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.0, knots - 1))])
-    return with_limits(
-        JointWay(1e-3 * x, configurations(chain, knots, seed)), chain, ANY_TOOL_SPEED
-    )
+    x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.0, 7))])
+    places = configurations(chain, 8, seed)
+    way = JointWay(1e-3 * x, places[0] + share * (places - places[0]))
+    return with_limits(way, chain, ANY_TOOL_SPEED)
 
 
 def ball(chain: SerialChain, center: Array, radius: float) -> Clearance:

@@ -38,7 +38,7 @@ def read_chain(
     try:
         m = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        raise _bad(path.name, f"the engine cannot compile it: {error}", "valid MJCF") from error
+        raise _not_compiled(path.name, error) from error
     return _Reading(m, path.name, tool, values or {}).chain()
 
 
@@ -60,12 +60,17 @@ def chain_of(
     try:
         m = mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
-        raise _bad(name, f"the engine cannot compile it: {error}", "valid MJCF") from error
+        raise _not_compiled(name, error) from error
     return _Reading(m, name, tool, values or {}).chain()
 
 
 def _bad(file: str, message: str, hint: str) -> InputError:
     return InputError(Diagnostic("BadArm", message, Position(file, 1, 1), hint))
+
+
+def _not_compiled(file: str, error: ValueError) -> InputError:
+    words = " ".join(str(error).split())
+    return _bad(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
 
 
 class _Reading:

@@ -25,8 +25,8 @@ REFERENCES, STEPS, STEP = 200, 300, 0.005
 
 
 def references(rng: np.random.Generator, length: float) -> Iterator[tuple[np.ndarray, ...]]:
-    """Coordinates, speeds and accelerations (REFERENCES,) at steps of 5 ms: towards speeds at random
-    with accelerations up to A, with stops and returns, and in time before the ends."""
+    """Coordinates, speeds and accelerations (REFERENCES,) at steps of 5 ms: to random speeds with
+    accelerations up to A, with stops and returns, and in time before the ends."""
     fast, most = PACE.speed, PACE.acceleration
     x, v = rng.uniform(0.0, length, REFERENCES), np.zeros(REFERENCES)
     aim = np.zeros(REFERENCES)
@@ -43,11 +43,11 @@ def references(rng: np.random.Generator, length: float) -> Iterator[tuple[np.nda
 
 @pytest.mark.parametrize("name", ["six", "scara"])
 def test_no_joint_is_above_its_limits_on_random_ways(name: str) -> None:
-    """10,000 references on 50 ways of both arms. Joints come near their limits."""
+    """10,000 references on 50 ways of both arms, long and short. Joints come near their limits."""
     chain, rng = shipped(name), np.random.default_rng(0)
     most = np.zeros(2)
     for seed in range(25):
-        way = random_way(chain, seed)
+        way = random_way(chain, seed, (1.0, 0.1)[seed % 2])
         rows = zip(*references(rng, way.length), strict=True)
         x, v, push = (np.concatenate(row) for row in rows)
         _, first, second = way.at(x)
@@ -55,7 +55,7 @@ def test_no_joint_is_above_its_limits_on_random_ways(name: str) -> None:
         gain = np.abs(first * push[:, None] + second * (v**2)[:, None])
         most = np.maximum(most, [speed.max(), (gain / chain.limits.acceleration).max()])
     assert (most <= 1.0 + 1e-9).all()
-    assert (most > 0.8).all()
+    assert (most > [0.9, 0.6]).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
