@@ -41,7 +41,7 @@ beside it. Above them are the apps, then the commands."""
 
 APPS = (
     ("drawing",),
-    ("foreign_nets", "importing", "few_robots", "relay", "platen", "log", "deviations"),
+    ("arms", "foreign_nets", "importing", "few_robots", "relay", "platen", "log", "deviations"),
     ("monitor", "recovery", "planning", "analyze", "exports"),
     ("runs", "resume", "revise"),
     ("sweep",),

@@ -33,7 +33,7 @@ NOT_PROVOKED = {
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
     *("CutOff", "NotProved", "Stalled", "Unstable"),
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
-    *("BadRobot", "Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
+    *("BadArm", "BadRobot", "Record", "CannotAssemble", "Hulls", "NotInPlace", "Unit"),
     *("HandOffTurn", "Mass", "NotSolid", "Options", "ProductError", "ProductTurn", "Shape"),
     *("Altered", "NotJudged", "Qualified", "Unseen"),
 }

@@ -89,12 +89,14 @@ def candidates(
     grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
     q, good = in_range(chain, np.concatenate(every), near)
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
-    grips, q, other = (a[good & joined] for a in (grips, q, other))
+    joined &= good
+    grips, q, other = grips[joined], q[joined], other[joined]
     visits = np.concatenate([q, other])
     lines, straights = straight(chain, visits, away(chain, visits), length)
     follows = straights.reshape(2, -1).all(axis=0)
     ends = np.concatenate([lines[:, 0], lines[:, -1]])
-    margin, pair = (a.reshape(4, -1)[:, follows] for a in clearance(ends))
+    margins, numbers = clearance(ends)
+    margin, pair = margins.reshape(4, -1)[:, follows], numbers.reshape(4, -1)[:, follows]
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
     blocked = _blocked(margin[:, ~clear], pair[:, ~clear])

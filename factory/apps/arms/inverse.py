@@ -1,5 +1,4 @@
-"""Inverse kinematics: all configurations that bring the tool to a pose, and what keeps a pose out of
-reach.
+"""Inverse kinematics: all configurations that bring the tool to a pose, and straight lines of it.
 
 Solutions are found by damped least squares (Levenberg-Marquardt) from many seeds at once. The seeds
 are points of a Kronecker sequence, the solutions are sorted: the same input gives the same bits. A
@@ -8,8 +7,6 @@ seed remains.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -99,7 +96,7 @@ def in_range(chain: SerialChain, q: Array, near: Array) -> tuple[Array, Truth]:
     least, most = np.ceil((low - q) / TURN), np.floor((high - q) / TURN)
     turns = np.minimum(np.maximum(np.round((near - q) / TURN), least), most)
     moved = np.where(chain.slides, q, q + TURN * turns)
-    return moved, ((low <= moved) & (moved <= high)).all(axis=-1)
+    return moved, np.all((low <= moved) & (moved <= high), axis=-1)
 
 
 def seeds(chain: SerialChain, count: int = SEEDS) -> Array:
@@ -170,100 +167,6 @@ def least_singular_value(chain: SerialChain, q: Array) -> Array:
     columns[..., :3, :] /= chain.length
     scaled = columns * np.where(chain.slides, chain.length, 1.0)
     return np.asarray(np.linalg.svd(scaled, compute_uv=False)[..., -1])
-
-
-@dataclass(frozen=True, slots=True)
-class Unreachable:
-    """Why a pose is out of an arm's reach, or only reached near a singular configuration.
-
-    Attributes:
-        distance: of the pose from the axis of the base [m].
-        height: of the pose above the base [m].
-        reach: the distance to which the arm comes at that height in that direction, with that
-            orientation; less than `distance` at the outer edge, more at the inner edge; None where
-            it comes to no distance there [m].
-        singular: least singular value of the best configuration, where the pose is reached.
-    """
-
-    distance: float
-    height: float
-    reach: float | None
-    singular: float | None = None
-
-    @property
-    def short(self) -> float:
-        """Distance between the pose and the edge [m]; infinite where there is none."""
-        return float("inf") if self.reach is None else abs(self.distance - self.reach)
-
-    def message(self, part: str, arm: str) -> str:
-        """What a diagnostic says of it.
-
-        Args:
-            part: what is at the pose.
-            arm: the name of the arm.
-        """
-        if self.singular is not None:
-            return (
-                f"'{part}' is reached by {arm} only within {SINGULAR:g} of a singular configuration"
-            )
-        where = f"'{part}' is {self.distance:.3f} m from the axis of {arm}"
-        where += f", at {self.height:.2f} m above its base"
-        if self.reach is None:
-            return f"{where}; it comes to no place at that height so turned"
-        if self.reach > self.distance:
-            return f"{where}; it comes no nearer than {self.reach:.3f} m there"
-        return f"{where}; it comes to {self.reach:.3f} m there, {self.short * 1e3:.0f} mm short"
-
-
-RAY, CUTS, ROUNDS = 24, 8, 4
-"""Number of places on the ray that are tried first, and of those between two of them in each round
-of the search for the edge."""
-
-
-def unreachable(chain: SerialChain, place: Array, turn: Array) -> Unreachable | None:
-    """Why an arm does not reach a pose, by a search on the ray from the axis of its base through it;
-    None where it does, with a least singular value of at least SINGULAR.
-
-    Args:
-        chain: the arm, whose base frame stands upright.
-        place: of the tool (3,) [m].
-        turn: orientation of the tool (3, 3).
-    """
-    distance, height = float(np.hypot(place[0], place[1])), float(place[2])
-    (there,) = solutions(chain, place[None], turn[None])
-    if len(there):
-        best = float(least_singular_value(chain, there).max())
-        return None if best >= SINGULAR else Unreachable(distance, height, distance, best)
-    way = np.array([*place[:2], 0.0]) / distance if distance else np.array([1.0, 0.0, 0.0])
-
-    def on_ray(radii: Array) -> Array:
-        return np.asarray(radii[:, None] * way + [0.0, 0.0, height])
-
-    radii = np.linspace(0.0, 1.1 * chain.length, RAY)
-    every = solutions(chain, on_ray(radii), np.tile(turn, (RAY, 1, 1)), SEEDS // 4)
-    good = [k for k, q in enumerate(every) if len(q)]
-    if not good:
-        return Unreachable(distance, height, None)
-    first = min(good, key=lambda k: abs(float(radii[k]) - distance))
-    edge, q = float(radii[first]), every[first]
-    far = distance
-    for _ in range(ROUNDS):
-        cuts = np.linspace(edge, far, CUTS + 1)[1:]
-        reached, q = _farthest(chain, on_ray(cuts), turn, q)
-        edge, far = float([edge, *cuts][reached]), float(cuts[min(reached, CUTS - 1)])
-    return Unreachable(distance, height, edge)
-
-
-def _farthest(chain: SerialChain, places: Array, turn: Array, q: Array) -> tuple[int, Array]:
-    """How many of some places in a row an arm reaches from configurations (k, n) at the place
-    before them, and its configurations at the last."""
-    count, k = len(places), len(q)
-    target = np.repeat(places, k, axis=0)
-    rows, there = descend(chain, target, turn, np.tile(q, (count, 1)), 3 * STEPS)
-    rows, inside = in_range(chain, rows, np.tile(q, (count, 1)))
-    good = (there & inside).reshape(count, k)
-    reached = int(np.argmin([*good.any(axis=1), False]))
-    return reached, rows.reshape(count, k, -1)[reached - 1][good[reached - 1]] if reached else q
 
 
 def straight(

@@ -1,7 +1,7 @@
 """Ways of arms: C² cubic splines g: [0, L] -> R^n from a coordinate x [m] to configurations.
 
-Property (∗): whoever follows x with |ẋ| <= V and |ẍ| <= A keeps every joint within its limits, which
-is so if |g'_j| V <= v_j and |g"_j| V² + |g'_j| A <= a_j for each joint j. On a piece of a cubic
+Property (∗): an arm that follows x with |ẋ| <= V and |ẍ| <= A keeps every joint within its limits.
+It holds if |g'_j| V <= v_j and |g"_j| V² + |g'_j| A <= a_j for each joint j. On a piece of a cubic
 spline g" is linear and g' lies in the hull of three control values, so both are bounded exactly,
 piece by piece, on the spline that is followed.
 """
@@ -185,4 +185,4 @@ def _slopes(x: Array, y: Array) -> Array:
         matrix[row, row], matrix[row, b] = step[b], both
         right[row] = (step[a] + 2 * both) * step[b] * secant[a] + step[a] ** 2 * secant[b]
         right[row] /= both
-    return np.linalg.solve(matrix, right)
+    return np.asarray(np.linalg.solve(matrix, right), float)

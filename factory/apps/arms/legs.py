@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -124,7 +125,7 @@ def transfer(
     if path is None:
         return search.no_way()
     path = search.shortened(path, rng)
-    rows = [line(p, q)[1:] for p, q in zip(path, path[1:], strict=False)]
+    rows = [line(p, q)[1:] for p, q in pairwise(path)]
     return np.concatenate([a[None], *rows])
 
 
@@ -176,7 +177,7 @@ def leg(
     into: Array,
     clearance: Clearance,
     ends: Clearance,
-    pace: WayLimits = WayLimits(),
+    pace: WayLimits,
     seed: int = 0,
 ) -> JointWay | NoWay:
     """The way from one visit to the next, or why there is none.

@@ -17,6 +17,9 @@ import numpy as np
 from factory.api import Array, Diagnostic, InputError, Position, mujoco, rotation
 from factory.apps.arms.chain import ConvexBody, JointLimits, LinkInertia, SerialChain, steiner
 
+MODELS = Path(__file__).parent / "mjcf"
+"""Where the arms of the catalogue are."""
+
 SIDES = 16
 """Number of sides of the prism round a cylinder."""
 
@@ -35,7 +38,7 @@ def read_chain(
     try:
         m = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        raise _bad(path.name, f"the engine cannot compile it: {error}", "valid MJCF") from error
+        raise _not_compiled(path.name, error) from error
     return _Reading(m, path.name, tool, values or {}).chain()
 
 
@@ -57,12 +60,17 @@ def chain_of(
     try:
         m = mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
-        raise _bad(name, f"the engine cannot compile it: {error}", "valid MJCF") from error
+        raise _not_compiled(name, error) from error
     return _Reading(m, name, tool, values or {}).chain()
 
 
 def _bad(file: str, message: str, hint: str) -> InputError:
     return InputError(Diagnostic("BadArm", message, Position(file, 1, 1), hint))
+
+
+def _not_compiled(file: str, error: ValueError) -> InputError:
+    words = " ".join(str(error).split())
+    return _bad(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
 
 
 class _Reading:
@@ -228,7 +236,7 @@ class _Reading:
         bodies = [b for b, k in enumerate(frames) if k == frame]
         mass = m.body_mass[bodies]
         at = np.array([self.place[b] + self.turn[b] @ m.body_ipos[b] for b in bodies])
-        at = (at - place) @ turn
+        at = (at.reshape(-1, 3) - place) @ turn
         weight = mass * (1 - m.body_gravcomp[bodies])
         center = mass @ at / max(float(mass.sum()), 1e-300)
         moment = np.zeros((3, 3))
@@ -279,7 +287,7 @@ def _convex(m: mujoco.MjModel, geom: int) -> tuple[Array, float]:
 
 
 def _hull(m: mujoco.MjModel, mesh: int) -> Array:
-    """The vertices (k, 3) of a mesh's convex hull; all of its vertices where the engine has none."""
+    """The vertices (k, 3) of a mesh's convex hull; all of them where the engine made no hull."""
     start = int(m.mesh_vertadr[mesh])
     vertices = m.mesh_vert[start : start + int(m.mesh_vertnum[mesh])].astype(float)
     graph = int(m.mesh_graphadr[mesh])

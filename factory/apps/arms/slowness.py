@@ -64,7 +64,8 @@ def least_smooth_majorant(values: Array, count: int) -> Array:
     count = max(1, count)
     padded = np.pad(values, 2 * count, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * count + 1)
-    return np.convolve(windows.max(axis=1), np.ones(2 * count + 1) / (2 * count + 1), "valid")
+    mean = np.full(2 * count + 1, 1 / (2 * count + 1))
+    return np.asarray(np.convolve(windows.max(axis=1), mean, "valid"))
 
 
 def way_through(
@@ -89,23 +90,30 @@ def way_through(
             speed].
     """
     rows = np.concatenate([out, middle[1:-1], into])
-    step = np.abs(np.diff(rows, axis=0) / chain.limits.speed).max(axis=1)
-    moves = np.concatenate([[True], step > 1e-9])
-    time = np.concatenate([[0.0], np.cumsum(step)])
+    steps = np.abs(np.diff(rows, axis=0) / chain.limits.speed).max(axis=1)
+    time = np.concatenate([[0.0], np.cumsum(steps)])
     t = np.linspace(0.0, time[-1], int(np.clip(time[-1] / STEP, FEWEST, MOST)))
-    first, end = time[round(stiff * (len(out) - 1))], time[-1 - round(stiff * (len(into) - 1))]
-    path = np.stack([np.interp(t, time[moves], row[moves]) for row in rows.T], axis=1)
+    path = np.stack([np.interp(t, time, row) for row in rows.T], axis=1)
     for part, at in ((out, time[: len(out)]), (into, time[len(rows) - len(into) :])):
         inside = (t >= at[0]) & (t <= at[-1])
         path[inside] = JointWay(at - at[0], part).at(t[inside] - at[0])[0]
+    ends = time[round(stiff * (len(out) - 1))], time[-1 - round(stiff * (len(into) - 1))]
     for _ in range(2):
-        half = np.clip(np.minimum(t - first, end - t) / 2, 0.0, rounding)
+        half = np.clip(np.minimum(t - ends[0], ends[1] - t) / 2, 0.0, rounding)
         path = box_average(t, path, half)
+    return with_limits(_through_samples(chain, t, path, ends, pace), chain, pace)
+
+
+def _through_samples(
+    chain: SerialChain, t: Array, path: Array, ends: tuple[float, float], pace: WayLimits
+) -> JointWay:
+    """The way through about KNOTS of a path's samples; `ends`: parameters where the straight
+    beginning ends and the straight end begins."""
     x = coordinates(chain, t, path, pace)
-    chosen = np.round(np.interp(np.linspace(0.0, x[-1], KNOTS), x, np.arange(len(x))))
-    pick = np.unique(chosen.astype(int))
-    off, hover = np.interp([first, end], t, x)
-    return with_limits(JointWay(x[pick], path[pick], float(off), float(hover)), chain, pace)
+    wanted = np.interp(np.linspace(0.0, x[-1], KNOTS), x, np.arange(len(x)))
+    pick = np.unique(np.round(wanted).astype(int))
+    off, hover = np.interp(ends, t, x).tolist()
+    return JointWay(x[pick], path[pick], off, hover)
 
 
 def with_limits(way: JointWay, chain: SerialChain, pace: WayLimits) -> JointWay:
@@ -149,7 +157,7 @@ def _tool_limits(tool: Array, pace: WayLimits) -> Array:
     gone = np.cumsum(np.linalg.norm(np.diff(tool, axis=0, prepend=tool[:1]), axis=1))
     beyond = np.maximum(np.minimum(gone, gone[-1] - gone) - pace.end_zone, 0.0)
     speed = np.sqrt(pace.end_speed**2 + 2 * pace.tool_gain * beyond)
-    return np.minimum(speed, pace.tool_speed)
+    return np.asarray(np.minimum(speed, pace.tool_speed))
 
 
 def coordinates(chain: SerialChain, t: Array, path: Array, pace: WayLimits) -> Array:

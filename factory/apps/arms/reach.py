@@ -1,0 +1,116 @@
+"""The reach of an arm: why it does not come to a pose, and by how much."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.api import Array
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.inverse import (
+    SEEDS,
+    SINGULAR,
+    STEPS,
+    descend,
+    in_range,
+    least_singular_value,
+    solutions,
+)
+
+RAY, CUTS, ROUNDS = 24, 8, 4
+"""Number of places on the ray that are tried first, and of those between two of them in each round
+of the search for the edge."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unreachable:
+    """Why a pose is out of an arm's reach, or only reached near a singular configuration.
+
+    Attributes:
+        distance: of the pose from the axis of the base [m].
+        height: of the pose above the base [m].
+        reach: the distance to which the arm comes at that height in that direction, with that
+            orientation; less than `distance` at the outer edge, more at the inner edge; None where
+            it comes to no distance there [m].
+        singular: least singular value of the best configuration, where the pose is reached.
+    """
+
+    distance: float
+    height: float
+    reach: float | None
+    singular: float | None = None
+
+    @property
+    def short(self) -> float:
+        """Distance between the pose and the edge [m]; infinite where there is none."""
+        return float("inf") if self.reach is None else abs(self.distance - self.reach)
+
+    def message(self, part: str, arm: str) -> str:
+        """The text of a diagnostic.
+
+        Args:
+            part: label of what is at the pose.
+            arm: name of the arm.
+        """
+        if self.singular is not None:
+            limit = f"only within {SINGULAR:g} of a singular configuration"
+            return f"'{part}' is reached by {arm} {limit}"
+        where = f"'{part}' is {self.distance:.3f} m from the axis of {arm}"
+        where += f", at {self.height:.2f} m above its base"
+        if self.reach is None:
+            return f"{where}; it comes to no place at that height so turned"
+        if self.reach > self.distance:
+            return f"{where}; it comes no nearer than {self.reach:.3f} m there"
+        return f"{where}; it comes to {self.reach:.3f} m there, {self.short * 1e3:.0f} mm short"
+
+
+def unreachable(chain: SerialChain, place: Array, turn: Array) -> Unreachable | None:
+    """Why an arm does not reach a pose, from a search on the ray from the axis of its base through
+    it; None where it does, with a least singular value of at least SINGULAR.
+
+    Args:
+        chain: the arm, whose base frame stands upright.
+        place: of the tool (3,) [m].
+        turn: orientation of the tool (3, 3).
+    """
+    distance, height = float(np.hypot(place[0], place[1])), float(place[2])
+    (there,) = solutions(chain, place[None], turn[None])
+    if len(there):
+        best = float(least_singular_value(chain, there).max())
+        return None if best >= SINGULAR else Unreachable(distance, height, distance, best)
+    way = np.array([place[0], place[1], 0.0]) / distance if distance else np.eye(3)[0]
+    return Unreachable(distance, height, _edge(chain, turn, way, distance, height))
+
+
+def _edge(
+    chain: SerialChain, turn: Array, way: Array, distance: float, height: float
+) -> float | None:
+    """The last distance on a ray that an arm reaches towards one that it does not reach [m]: from
+    the nearest that it reaches, by sections; None where it reaches none."""
+    middle, radii = height * np.eye(3)[2], np.linspace(0.0, 1.1 * chain.length, RAY)
+    turns = np.tile(turn, (RAY, 1, 1))
+    every = solutions(chain, radii[:, None] * way + middle, turns, SEEDS // 4)
+    good = [k for k, q in enumerate(every) if len(q)]
+    if not good:
+        return None
+    first = min(good, key=lambda k: abs(float(radii[k]) - distance))
+    edge, beyond, q = float(radii[first]), distance, every[first]
+    for _ in range(ROUNDS):
+        cuts = np.linspace(edge, beyond, CUTS + 1)
+        reached, q = _farthest(chain, cuts[1:, None] * way + middle, turn, q)
+        edge, beyond = float(cuts[reached]), float(cuts[min(reached + 1, CUTS)])
+    return edge
+
+
+def _farthest(chain: SerialChain, places: Array, turn: Array, q: Array) -> tuple[int, Array]:
+    """How many of some places in a row an arm reaches from configurations (k, n) at the place
+    before them, and its configurations at the last."""
+    start = np.tile(q, (len(places), 1))
+    rows, there = descend(chain, np.repeat(places, len(q), axis=0), turn, start, 3 * STEPS)
+    rows, inside = in_range(chain, rows, start)
+    good = (there & inside).reshape(len(places), len(q))
+    reached = int(np.argmin(np.append(good.any(axis=1), False)))
+    if not reached:
+        return 0, q
+    return reached, rows.reshape(len(places), len(q), -1)[reached - 1][good[reached - 1]]

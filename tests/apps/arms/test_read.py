@@ -1,0 +1,247 @@
+"""Arms from MJCF: what is read is what the engine compiles; what is no arm is refused by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from factory.api import InputError
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.read import MODELS, chain_of, read_chain
+from tests.arm_models import configurations, random_arm, shipped
+
+LIMITS = (
+    '<custom><numeric name="speed" data="1 2"/><numeric name="acceleration" data="3 4"/></custom>'
+)
+LINK = '<body pos="0 0 0.2">{}<geom size="0.05"/>'
+FIRST = '<joint name="pan" axis="0 0 1" range="-90 90"/>'
+SECOND = '<joint name="wrist" axis="0 1 0" range="-90 90"/>'
+SITE = '<site name="tool" pos="0.1 0 0"/>'
+
+
+def arm(
+    first: str = FIRST,
+    second: str = SECOND,
+    site: str = SITE,
+    beside: str = "",
+    head: str = LIMITS,
+    after: str = "",
+) -> str:
+    links = LINK.format(first) + LINK.format(second) + site + "</body>" + beside + "</body>"
+    return f"<mujoco>{head}<worldbody>{links}</worldbody>{after}</mujoco>"
+
+
+BAD = {
+    "is a ball joint": arm(second='<joint name="wrist" type="ball" range="0 90"/>'),
+    "joint 'pan' is a free joint": arm(first='<freejoint name="pan"/>'),
+    "has no site 'tool'": arm(site='<site name="tip"/>'),
+    "is not one chain: joint 'finger' is not between base and tool": arm(
+        beside=LINK.format('<joint name="finger" range="0 9"/>') + "</body>"
+    ),
+    "has no joints": arm(first="", second=""),
+    "joint 'wrist' has no limits": arm(second='<joint name="wrist" axis="0 1 0"/>'),
+    "joint 'wrist' has a spring": arm(second=SECOND.replace("/>", ' stiffness="3"/>')),
+    "has equality constraints or tendons": arm(
+        after='<equality><joint joint1="pan" joint2="wrist"/></equality>'
+    ),
+    "says no speed of its joints": arm(head=""),
+    "says no acceleration of its joints": arm(
+        head='<custom><numeric name="speed" data="1 2"/></custom>'
+    ),
+    "has the speed [1.0, 2.0, 3.0]": arm(head=LIMITS.replace("1 2", "1 2 3")),
+    "has the acceleration [3.0, -4.0]": arm(head=LIMITS.replace("3 4", "3 -4")),
+    "the engine cannot compile it: ": "<mujoco><arm/></mujoco>",
+}
+"""What is said of texts that are no arms."""
+
+
+@pytest.mark.parametrize("words", BAD)
+def test_what_is_no_arm_is_refused_by_name(words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        chain_of(BAD[words], name="ur.xml")
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.code == "BadArm" and words in diagnostic.message
+    assert diagnostic.hint and str(diagnostic.position).startswith("ur.xml:")
+
+
+def test_hints_say_what_would_be_valid() -> None:
+    def hint(words: str) -> str:
+        with pytest.raises(InputError) as caught:
+            chain_of(BAD[words])
+        return caught.value.diagnostics[0].hint
+
+    assert hint("has no site 'tool'") == ('add <site name="tool"/> at the tool (its sites are tip)')
+    assert hint("says no speed of its joints").startswith("speed = [...], 2 numbers above 0")
+    assert "fingers" in hint("is not one chain: joint 'finger' is not between base and tool")
+
+
+def test_the_same_arm_without_a_fault_is_read() -> None:
+    """In degrees, which the file does not say; limits beside the file come first."""
+    chain = chain_of(arm())
+    assert chain.joints == ("pan", "wrist") and not chain.slides.any()
+    assert chain.limits.high == pytest.approx([np.pi / 2] * 2)
+    assert chain.limits.speed.tolist() == [1.0, 2.0]
+    assert chain.limits.acceleration.tolist() == [3.0, 4.0]
+    assert np.isinf(chain.limits.torque).all()
+    assert chain.tool(np.zeros(2))[0] == pytest.approx([0.1, 0.0, 0.4])
+    other = chain_of(arm(), values={"speed": [5.0, 6.0]})
+    assert other.limits.speed.tolist() == [5.0, 6.0]
+    assert chain_of(arm(site='<site name="tip"/>'), tool="tip").joints == ("pan", "wrist")
+
+
+def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
+    drives = (
+        '<actuator><position joint="pan" kp="1" forcerange="-9 7"/>'
+        '<motor joint="wrist" gear="3" ctrlrange="-2 2"/></actuator>'
+    )
+    assert chain_of(arm(after=drives)).limits.torque.tolist() == [7.0, 6.0]
+    weak = FIRST.replace("/>", ' actuatorfrcrange="-5 6"/>')
+    assert chain_of(arm(first=weak, after=drives)).limits.torque.tolist() == [5.0, 6.0]
+
+
+def test_an_arm_on_a_pedestal_is_read_in_the_frame_of_its_base() -> None:
+    """What stands beside it is not the arm's, and its place does not matter."""
+    inside = arm().partition("<worldbody>")[2].partition("</worldbody>")[0]
+    places = 'pos="0 0 0"', 'pos="1 2 3" euler="0 30 70"'
+    chains = []
+    for place in places:
+        base = f'<body name="base" {place}><geom name="foot" size="0.1"/>{inside}</body>'
+        text = f'<geom name="floor" type="plane" size="1 1 1"/><geom name="wall" size="2"/>{base}'
+        chains.append(chain_of(f"<mujoco>{LIMITS}<worldbody>{text}</worldbody></mujoco>"))
+    one, other = chains
+    assert [body.name for body in one.bodies] == ["foot", "geom 4", "geom 5"]
+    q = configurations(one, 5, 0)
+    for value, same in zip(one.tool(q), other.tool(q), strict=True):
+        assert np.abs(value - same).max() < 1e-12
+
+
+def surface(m: mujoco.MjModel, geom: int, ways: np.ndarray) -> np.ndarray:
+    """The extent of a geom in directions in its own frame (k,), from its definition."""
+    size, kind = m.geom_size[geom], m.geom_type[geom]
+    flat = np.hypot(ways[:, 0], ways[:, 1])
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return np.full(len(ways), size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return np.asarray(size[0] + size[1] * np.abs(ways[:, 2]))
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return np.asarray(size[0] * flat + size[1] * np.abs(ways[:, 2]))
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return np.linalg.norm(ways * size, axis=1)
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        start = m.mesh_vertadr[m.geom_dataid[geom]]
+        count = m.mesh_vertnum[m.geom_dataid[geom]]
+        return np.asarray((ways @ m.mesh_vert[start : start + count].T).max(axis=1))
+    return np.asarray(np.abs(ways) @ size)
+
+
+def geoms(wrist: str) -> str:
+    rows = [
+        'type="box" size="0.1 0.05 0.02"',
+        'type="capsule" size="0.03" fromto="0 0 0 0.1 0.2 0.3"',
+        'type="cylinder" size="0.04 0.1" euler="10 20 30"',
+        'type="sphere" size="0.05" pos="0.1 0 0"',
+        'type="ellipsoid" size="0.05 0.03 0.02"',
+        'type="mesh" mesh="rock" pos="0 0.1 0" euler="5 6 7"',
+    ]
+    text = "".join(f'<geom name="g{k}" {row}/>' for k, row in enumerate(rows))
+    points = np.random.default_rng(0).normal(size=(40, 3)) * 0.05
+    vertices = " ".join(map(str, points.ravel().tolist()))
+    asset = f'<asset><mesh name="rock" vertex="{vertices}"/></asset>'
+    return arm(second=wrist + text, head=LIMITS + asset)
+
+
+def test_bodies_contain_their_geoms_and_hardly_more() -> None:
+    """In 500 directions, for each kind of geom; a cylinder's prism is 2 % wider."""
+    text = geoms(SECOND)
+    chain, m = chain_of(text), mujoco.MjModel.from_xml_string(text)
+    d = mujoco.MjData(m)
+    rng = np.random.default_rng(1)
+    q = np.array([0.4, -0.7])
+    d.qpos[:] = q
+    mujoco.mj_forward(m, d)
+    place, turn = chain.frames(q)
+    for body in chain.bodies:
+        geom = m.geom(body.name).id if body.name in ("g0", "g1", "g2", "g3", "g4", "g5") else -1
+        if geom < 0:
+            continue
+        ways = rng.normal(size=(500, 3))
+        ways /= np.linalg.norm(ways, axis=1)[:, None]
+        points = place[body.frame] + body.points @ turn[body.frame].T
+        extent = (ways @ points.T).max(axis=1) + body.radius - ways @ d.geom_xpos[geom]
+        exact = surface(m, geom, ways @ d.geom_xmat[geom].reshape(3, 3))
+        assert (extent >= exact - 1e-6).all(), body.name
+        loose = {"g2": 1.025, "g4": 2.0}.get(body.name, 1.0 + 1e-5)
+        assert (extent <= exact * loose + 1e-6).all(), body.name
+    assert len(chain.bodies) == 8
+
+
+def test_what_is_only_shown_does_not_count_unless_nothing_else_is_there() -> None:
+    shown = '<geom name="shown" size="0.1" contype="0" conaffinity="0"/>'
+    text = arm(second=SECOND + shown)
+    assert "shown" not in [body.name for body in chain_of(text).bodies]
+    nothing = text.replace('<geom size="0.05"/>', '<geom size="0.05" contype="0" conaffinity="0"/>')
+    assert "shown" in [body.name for body in chain_of(nothing).bodies]
+
+
+@pytest.mark.parametrize("name", ["six", "scara"])
+def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
+    """Each shown geom lies within the hull of what is solid of its link: nothing drawn sticks out
+    of all that collides along any of 200 directions, and that reaches 20 mm further at most."""
+    m = mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml"))
+    ways = np.random.default_rng(0).normal(size=(200, 3))
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    extents: dict[tuple[int, bool], np.ndarray] = {}
+    for geom in range(m.ngeom):
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, m.geom_quat[geom])
+        extent = surface(m, geom, ways @ turn.reshape(3, 3)) + ways @ m.geom_pos[geom]
+        key = int(m.geom_bodyid[geom]), bool(m.geom_contype[geom])
+        extents[key] = np.maximum(extents.get(key, -np.inf), extent)
+    bodies = {body for body, _ in extents}
+    for body in bodies:
+        assert (extents[body, False] <= extents[body, True] + 1e-9).all(), m.body(body).name
+        assert (extents[body, False] >= extents[body, True] - 0.02).all()
+
+
+def test_the_shipped_arms_have_the_lengths_and_limits_they_are_said_to_have() -> None:
+    six, scara = shipped("six"), shipped("scara")
+    at, turn = six.tool(np.zeros(6))
+    assert at == pytest.approx([0.0, 0.133 + 0.1, 0.163 + 0.425 + 0.392 + 0.1])
+    assert turn[:, 2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-7)
+    assert six.limits.torque.tolist() == [150.0] * 3 + [28.0] * 3
+    assert six.limits.speed.tolist() == [2.0] * 6
+    assert scara.slides.tolist() == [False, False, True, False]
+    at, turn = scara.tool(np.array([0.0, 0.0, 0.1, 0.0]))
+    assert at == pytest.approx([0.5, 0.0, 0.1]) and turn[2, 2] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_masses_are_those_of_the_file(seed: int) -> None:
+    """What a link weighs is there once, whatever bodies are fixed to it."""
+    text = random_arm(seed)
+    chain: SerialChain = chain_of(text)
+    m = mujoco.MjModel.from_xml_string(text)
+    moving = np.isin(np.arange(m.nbody), below(m, int(m.jnt_bodyid[0])))
+    assert chain.inertia.mass.sum() == pytest.approx(m.body_mass[moving].sum())
+    weight = m.body_mass * (1 - m.body_gravcomp)
+    assert chain.inertia.weight.sum() == pytest.approx(weight[moving].sum())
+
+
+def below(m: mujoco.MjModel, root: int) -> list[int]:
+    """A body and all that hang on it."""
+    there = [root]
+    for body in range(root + 1, m.nbody):
+        if int(m.body_parentid[body]) in there:
+            there.append(body)
+    return there
+
+
+def test_a_file_is_read_where_it_is(tmp_path: Path) -> None:
+    """Meshes beside it are found; a file that is not there is an error of the same kind."""
+    (tmp_path / "arm.xml").write_text(arm())
+    assert read_chain(tmp_path / "arm.xml").joints == ("pan", "wrist")
+    with pytest.raises(InputError, match="cannot compile"):
+        read_chain(tmp_path / "none.xml")
