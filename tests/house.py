@@ -82,6 +82,8 @@ ENGINE_WRITERS = (
     "apps/deviations",
     "apps/recovery",
     "apps/fidelity/solid",
+    "apps/arms/scene",
+    "apps/arms/sharing",
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""

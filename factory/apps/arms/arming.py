@@ -22,6 +22,8 @@ from factory.theory.problem.robot_types import Catalogue, RobotType
 MODELS = Path(__file__).with_name("mjcf")
 """The files of the arms that are shipped."""
 
+RAILS = "leave out --arm: rails make it"
+
 PLACE = """
 place = (R, j, ~, <a; b>, F) where
   R = < dot, {kind} >;
@@ -47,7 +49,10 @@ def robot_type(kind: str, file: Path) -> RobotType:
 
 def armed(project: Project, kind: str, arms: int = 1) -> Project:
     """The project in which some arms of a kind place all parts but the first, by turns. Raises
-    InputError (NeedsNest) where two sub-assemblies are joined."""
+    InputError (NoCell) where two sub-assemblies are joined."""
+    if project.pag.mix is not None:
+        message = f"a cell makes one product, not a mix: {project.pag.title}"
+        raise InputError(Diagnostic("NoCell", message, None, RAILS))
     catalogue, pag = project.catalogue, _placing(project.pag)
     types = {**catalogue.types, kind: robot_type(kind, MODELS / f"{kind}.xml")}
     templates = {**project.templates, "place": read_template(PLACE.format(kind=kind), f"{kind}.op")}
@@ -78,14 +83,24 @@ def _placing(pag: PAG) -> PAG:
 
 
 def _nodes(pag: PAG) -> Iterator[Assembly]:
+    """The nodes with two inputs at most: `x = mate ( a, b, c )` is placed one by one."""
     for node in pag.nodes:
-        if len(node.inputs) < 2:
+        if len(node.inputs) == 1:
+            message = f"'{node.label}' is made by a tool, {node.operation}; a cell has none"
+            raise InputError(Diagnostic("NoCell", message, node.position, RAILS))
+        if not node.inputs:
             yield node
             continue
         piles = [label for label in node.inputs if pag[label].inputs]
         if len(piles) > 1:
             message = f"'{node.label}' joins the sub-assemblies {', '.join(map(repr, piles))}"
-            hint = "a cell of one arm adds part by part; leave out --arm"
-            raise InputError(Diagnostic("NeedsNest", message, node.position, hint))
-        inputs = (*piles, *(label for label in node.inputs if label not in piles))
-        yield replace(node, operation="place", inputs=inputs)
+            message = f"{message}; a cell adds part by part"
+            raise InputError(Diagnostic("NoCell", message, node.position, RAILS))
+        pile, *parts = (*piles, *(label for label in node.inputs if label not in piles))
+        for number, part in enumerate(parts, start=2):
+            last = number == len(node.inputs)
+            label = node.label if last else f"{node.label}/{number}"
+            yield replace(
+                node, label=label, operation="place", inputs=(pile, part), input_positions=()
+            )
+            pile = label

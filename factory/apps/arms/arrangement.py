@@ -11,11 +11,13 @@ from math import asin, cos, pi, radians, sin
 import numpy as np
 
 from factory.api import Array, Diagnostic, Factory, Layout, RunError
-from factory.apps.arms.body import PEDESTAL, STEM, Stand
-from factory.apps.arms.cell import PEDESTAL_HEIGHT, Well, down, shown_height, tip_on, well_of
+from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
+from factory.apps.arms.cell import GAP, PEDESTAL_HEIGHT, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.scene import Obstacle
+from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.solids import Product
+from factory.floor.geometry.suction import GAP as SUCTION_GAP
+from factory.floor.geometry.suction import PadPlace, pad_place
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.guidepath import Box, Guidepath
@@ -113,7 +115,7 @@ class Arrangement:
             raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
         (x, y), off = self.station, NEAR * self.far
         return {
-            arm: Stand((x, y + side * off, PEDESTAL_HEIGHT), -side * pi / 2)
+            arm: Stand((x, y + side * off, PEDESTAL_HEIGHT), -side * pi / 2, self.pad)
             for arm, side in zip(self.arms, SIDES, strict=False)
         }
 
@@ -153,9 +155,20 @@ class Arrangement:
             yield label, (x + radius * cos(turned), y + radius * sin(turned))
 
     @cached_property
+    def pads(self) -> dict[str, PadPlace]:
+        """Where a pad is on each part, and how large it may be there."""
+        return {label: pad_place(self.product.solids[label], (1.0, 0.0)) for label in self.arm_of}
+
+    @cached_property
+    def pad(self) -> float:
+        """Radius of the pads of the arms' tools: there is room for them on every part [m]."""
+        return min(PAD_RADIUS, *(float(pad.radius) for pad in self.pads.values()))
+
+    @cached_property
     def tip(self) -> dict[str, Array]:
         """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
-        return {label: tip_on(self.product.solids[label]) for label in self.arm_of}
+        off = np.array([0.0, 0.0, GAP - SUCTION_GAP])
+        return {label: np.asarray(pad.at + off) for label, pad in self.pads.items()}
 
     @property
     def _foot(self) -> Array:
@@ -213,21 +226,21 @@ class Arrangement:
         place = down(0.0).T @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
         return [(place, half, np.array([0.0, 1.0, 0.0, 0.0]))]
 
-    def obstacles(self, arm: int, bare: Layout) -> Iterator[Obstacle]:
+    def obstacles(self, arm: int, bare: Layout) -> Iterator[StandingBox]:
         """What stands in an arm's way, or may come there while it is on a transfer.
 
         Args:
             arm: the arm (index).
             bare: the layout without legs.
         """
-        yield Obstacle("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
+        yield StandingBox("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
         yield from self._carrier()
         for label, well in self.wells.items():
             xlo, xhi, ylo, yhi = well.feeder.housing
-            yield Obstacle(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
-            yield self._part(f"'{label}'", label, self.shown(label))
+            yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
+            yield from self._part(f"'{label}'", label, self.shown(label))
         for label in self.product.solids:
-            yield self._part(placed_name(label), label, self.placed)
+            yield from self._part(placed_name(label), label, self.placed)
         first = self.factory.first(0).label
         feeder = feeder_of(bare, first)
         for name, box, bottom in (
@@ -246,7 +259,7 @@ class Arrangement:
                 name = self.factory.robots[other].name
                 yield _upright(f"the base of {name}", box, 0.0, z + BASE)
 
-    def _carrier(self) -> Iterator[Obstacle]:
+    def _carrier(self) -> Iterator[StandingBox]:
         """All that the carrier takes with the product on its line."""
         ends = [self.line.middle(x) for x in (self.line.reach, self.line.length)]
         low, high = sorted(end[0] for end in ends)
@@ -255,10 +268,14 @@ class Arrangement:
         back = max(half, self.line.reach + self.factory.carriage / 2)
         yield _upright(CARRIER, (low - back, high + half, y - side, y + side), 0.0, self.top)
 
-    def _part(self, name: str, label: str, off: Array) -> Obstacle:
+    def _part(self, name: str, label: str, off: Array) -> Iterator[StandingBox]:
+        """The boxes round the convex pieces of a part."""
         solid = self.product.solids[label]
-        low, high = (tuple(map(float, end + off)) for end in (solid.low, solid.high))
-        return Obstacle(name, (low[0], low[1], low[2]), (high[0], high[1], high[2]))
+        ends = [(piece.min(axis=0), piece.max(axis=0)) for piece in solid.pieces if solid.mesh]
+        for low, high in ends or [(solid.low, solid.high)]:
+            xlo, ylo, zlo = (low + off).tolist()
+            xhi, yhi, zhi = (high + off).tolist()
+            yield StandingBox(name, (xlo, ylo, zlo), (xhi, yhi, zhi))
 
     @cached_property
     def floor(self) -> Box:
@@ -268,9 +285,9 @@ class Arrangement:
         for stand in self.stands.values():
             x, y, _ = stand.place
             boxes.append((x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL))
-        ahead = self.line.middle(self.line.length)[0]
-        c, back = self.rails.clearance, xlo - self.rails.guidepaths[0].travel * 0
-        behind = ahead - (self.rails.guidepaths[0].middle(self.rails.guidepaths[0].length)[0] - back)
+        c, path = self.rails.clearance, self.rails.guidepaths[0]
+        further = path.middle(path.length)[0] - self.line.middle(self.line.length)[0]
+        behind = xlo - further
         return (
             float(min(behind, *(b[0] for b in boxes))) - c,
             float(max(xhi, *(b[1] for b in boxes))) + c,
@@ -298,6 +315,6 @@ def placed_name(label: str) -> str:
     return f"'{label}' in the product"
 
 
-def _upright(name: str, box: Box, low: float, high: float) -> Obstacle:
+def _upright(name: str, box: Box, low: float, high: float) -> StandingBox:
     xlo, xhi, ylo, yhi = map(float, box)
-    return Obstacle(name, (xlo, ylo, float(low)), (xhi, yhi, float(high)))
+    return StandingBox(name, (xlo, ylo, float(low)), (xhi, yhi, float(high)))

@@ -1,4 +1,4 @@
-"""The body of an arm in a model: that of its file on a pedestal, with a suction tool at its site."""
+"""The body of an arm in a model: that of its file on a pedestal, with a suction tool."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from factory.api import mujoco
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""
 
-STEM_RADIUS, PAD_RADIUS = 0.006, 0.008
-"""Radii of the tool's stem and pad [m]."""
+PAD_RADIUS, SLIM = 0.008, 0.75
+"""Radius of the largest pad [m], and that of a stem as a share of its pad's."""
 
 PEDESTAL = 0.075
 """Radius of a pedestal [m]."""
@@ -34,10 +34,12 @@ class Stand:
     Attributes:
         place: of its base in the world (3,) [m].
         yaw: angle of its base about the vertical [rad].
+        pad: radius of its tool's pad [m].
     """
 
     place: tuple[float, float, float]
     yaw: float
+    pad: float
 
 
 def standing(file: Path, stand: Stand, site: str = "tool") -> Element:
@@ -55,23 +57,19 @@ def standing(file: Path, stand: Stand, site: str = "tool") -> Element:
     for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
         if key in mount.attrib:
             tool.set(key, mount.attrib[key])
-    tool.append(
-        _cylinder("stem", STEM_RADIUS, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1")
-    )
-    tool.append(_cylinder("pad", PAD_RADIUS, STEM - PAD, STEM, 0.0, GRAPHITE))
+    tool.append(_cylinder("stem", SLIM * stand.pad, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1"))
+    tool.append(_cylinder("pad", stand.pad, STEM - PAD, STEM, 0.0, GRAPHITE))
     return root
 
 
 def mass_of(file: Path) -> float:
     """What an arm weighs with its pedestal and its tool [kg]."""
-    root = standing(file, Stand((0.0, 0.0, 0.1), 0.0))
+    root = standing(file, Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS))
     m = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
     return float(m.body_subtreemass[m.body("carriage").id])
 
 
-def _cylinder(
-    name: str, radius: float, low: float, high: float, mass: float, rgba: str
-) -> Element:
+def _cylinder(name: str, radius: float, low: float, high: float, mass: float, rgba: str) -> Element:
     return Element(
         "geom",
         {

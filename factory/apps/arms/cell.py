@@ -19,7 +19,6 @@ from factory.api import Array, Factory, mujoco
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.floor.geometry.solids import Product, Solid
-from factory.floor.geometry.suction import pad_place
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 
@@ -34,6 +33,7 @@ BELOW = 0.005
 
 PEDESTAL_HEIGHT = 0.10
 """Height of an arm's base [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Well:
@@ -51,7 +51,7 @@ class Well:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Grip:
+class ToolGrip:
     """Where an arm's tool is on a part.
 
     Attributes:
@@ -72,13 +72,6 @@ def down(yaw: float) -> Array:
     """The orientation (3, 3) of a tool that points down, turned about the vertical [rad]."""
     c, s = cos(yaw), sin(yaw)
     return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
-
-
-def tip_on(solid: Solid) -> Array:
-    """Where the tip of a tool is on a part, in the product's frame (3,) [m]."""
-    place = pad_place(solid, (1.0, 0.0))
-    top = np.array(place.at)
-    return top + [0.0, 0.0, GAP - 1e-4]  # `pad_place` is a pad's gap above the part
 
 
 @dataclass(eq=False)
@@ -105,7 +98,7 @@ class CellChains:
     file: Path
     stands: Mapping[int, Stand]
     wells: Mapping[str, Well]
-    grips: Mapping[str, Grip]
+    grips: Mapping[str, ToolGrip]
     curves: LegTable
     rows: Mapping[tuple[int, int], int]
     standoffs: Mapping[int, float]
@@ -122,7 +115,10 @@ class CellChains:
     def sought(self) -> SoughtLegs:
         """The legs for one who does not know which an arm follows."""
         return SoughtLegs(
-            [[self.curves.legs[n] for (_, r), n in self.rows.items() if r == robot] for robot in self.robots]
+            [
+                [self.curves.legs[n] for (_, arm), n in self.rows.items() if arm == robot]
+                for robot in self.robots
+            ]
         )
 
     def row(self, operation: int, robot: int) -> int:

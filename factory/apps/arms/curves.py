@@ -76,7 +76,7 @@ class Leg:
         rate, gain = (self.sign * v)[..., None], (self.sign * a)[..., None]
         first = self.way.at(self.along(x))[1]
         drag = self.damping * first * rate
-        return law[..., 0, :] * gain + law[..., 1, :] * rate**2 + law[..., 2, :] + drag
+        return np.asarray(law[..., 0, :] * gain + law[..., 1, :] * rate**2 + law[..., 2, :] + drag)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +93,8 @@ class LegTable:
     def at(self, rows: Index, x: Array) -> tuple[Array, Array, Array]:
         """Places, first and second derivatives (..., m, n) of legs (m,) at coordinates (..., m)
         [m]."""
-        found = [self.legs[row].at(x[..., k]) for k, row in enumerate(rows.tolist())]
-        g, first, second = (np.stack(each, axis=-2) for each in zip(*found, strict=True))
+        points = [self.legs[row].at(x[..., k]) for k, row in enumerate(rows.tolist())]
+        g, first, second = (np.stack(each, axis=-2) for each in zip(*points, strict=True))
         return g, first, second
 
     def along(
@@ -118,11 +118,11 @@ class LegTable:
         """Torques (..., m, n) of the drives along legs (m,) at coordinates (..., m), speeds and
         accelerations, with payloads (m,) [kg]."""
         x, v, a = motion
-        found = [
+        torques = [
             self.legs[row].force(x[..., k], v[..., k], a[..., k], float(load[k]))
             for k, row in enumerate(rows.tolist())
         ]
-        return np.stack(found, axis=-2)
+        return np.stack(torques, axis=-2)
 
 
 GRID = 200
@@ -161,8 +161,8 @@ class SoughtLegs:
             off = np.linalg.norm(grid - q, axis=-1)
             row, at = np.unravel_index(int(off.argmin()), off.shape)
             leg = self.legs[arm][int(row)]
-            found, _ = leg.way.nearest(q[None], s[row, at : at + 1])
-            x[arm] = leg.reach + (leg.way.length - found[0] if leg.brings else found[0])
+            (near,), _ = leg.way.nearest(q[None], s[row, at : at + 1])
+            x[arm] = leg.reach + (leg.way.length - near if leg.brings else near)
             first[arm] = leg.at(x[arm : arm + 1])[1][0]
         return x, first
 

@@ -27,9 +27,7 @@ class CellGround(Ground):
     kind: str = ""
     rails: Project | None = field(default=None, compare=False, repr=False)
 
-    def lay_out(
-        self, factory: Factory, product: Product, settings: Settings, *_: Any
-    ) -> Layout:
+    def lay_out(self, factory: Factory, product: Product, settings: Settings, *_: Any) -> Layout:
         """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
         from factory.apps.arms.laying import Arm, laid_out
         from factory.floor.geometry.fused_bodies import repeated
@@ -64,7 +62,7 @@ def with_arm(project: Project, asked: str) -> Project:
         project: of the product.
         asked: the kind of arm, or `KIND=NUMBER` for several.
 
-    Raises InputError: Usage for an unknown kind, NeedsNest where two sub-assemblies are joined.
+    Raises InputError: Usage for an unknown kind, NoCell for what a cell cannot make.
     """
     kind, _, number = asked.partition("=")
     if kind not in KINDS:

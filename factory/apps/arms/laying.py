@@ -19,9 +19,9 @@ from factory.apps.arms.body import STEM
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
-from factory.apps.arms.planning import ArmPlanner, Tour
+from factory.apps.arms.planning import ArmPlanner, ArmTour
 from factory.apps.arms.read import read_chain
-from factory.apps.arms.sharing import Swept, clear_from
+from factory.apps.arms.sharing import SweptArm, clear_from
 from factory.floor.layout.certificate import (
     ARM_BODY,
     PAYLOAD_BODY,
@@ -92,7 +92,7 @@ def laid_out(factory: Factory, rails: Layout, arm: Arm, pace: WayLimits) -> Layo
     return replace(layout, certificate=_certificate(cell, layout, apart))
 
 
-def _alike(tours: Mapping[int, Sequence[Tour]]) -> dict[int, list[Tour]]:
+def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
     """The tours of all arms with ways of one length."""
     ways = [way for each in tours.values() for t in each for way in (t.goes, t.brings)]
     length = max(way.length for way in ways)
@@ -113,7 +113,7 @@ def _chains(
     cell: Arrangement,
     arm: Arm,
     planners: Mapping[int, ArmPlanner],
-    tours: Mapping[int, Sequence[Tour]],
+    tours: Mapping[int, Sequence[ArmTour]],
 ) -> CellChains:
     """What the cell says of its arms."""
     factory, legs, rows = cell.factory, list[Leg](), dict[tuple[int, int], int]()
@@ -186,7 +186,7 @@ class Away:
 
 
 def _orders(
-    cell: Arrangement, planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[Tour]]
+    cell: Arrangement, planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
 ) -> Iterator[Away]:
     """What keeps arms apart at the station, and from the carrier that leaves it. Raises RunError
     (Layout) where an arm at its feeder is in the way of another."""
@@ -207,8 +207,8 @@ def _orders(
             continue
         goes, then = _next(tours[one], left.label).goes, _next(tours[other], comes.label).goes
         scene = planners[other].scene
-        others = Swept.of(scene, comes.brings, comes.label), Swept.of(scene, then)
-        share = clear_from(Swept.of(planners[one].scene, goes), others)
+        others = SweptArm.of(scene, comes.brings, comes.label), SweptArm.of(scene, then)
+        share = clear_from(SweptArm.of(planners[one].scene, goes), others)
         if share is None:
             names = (factory.robots[arm].name for arm in (one, other))
             message = f"{' and '.join(names)} are in each other's way at their feeders"
@@ -220,7 +220,7 @@ def _orders(
 
 
 def _exclusions(
-    layout: Layout, asked: Sequence[Away], tours: Mapping[int, Sequence[Tour]]
+    layout: Layout, asked: Sequence[Away], tours: Mapping[int, Sequence[ArmTour]]
 ) -> Exclusions:
     """The passes and order places that are asked for; arms go by themselves to over their next
     feeders. Raises RunError (Layout) where the net with them is not live."""
@@ -249,7 +249,7 @@ def _brought(cell: Arrangement, join: Operation) -> str:
     return next(label for label in join.inputs if label in cell.arm_of)
 
 
-def _next(tours: Sequence[Tour], label: str) -> Tour:
+def _next(tours: Sequence[ArmTour], label: str) -> ArmTour:
     """The tour of an arm after that of a part."""
     labels = [t.label for t in tours]
     return tours[(labels.index(label) + 1) % len(labels)]

@@ -10,13 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
+from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import CARRIER, Arrangement, feeder_name, placed_name
 from factory.apps.arms.body import standing
-from factory.apps.arms.cell import Grip, down
+from factory.apps.arms.cell import ToolGrip, down
 from factory.apps.arms.circuit import candidates, circuit
-from factory.apps.arms.inverse import away, straight, unreachable
+from factory.apps.arms.inverse import away, straight
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
+from factory.apps.arms.reach import unreachable
 from factory.apps.arms.scene import NEED, Scene
 
 YAWS = 8
@@ -28,11 +30,9 @@ AT_END = 0.001
 VISITED = 0.002
 """Clearance that is asked of configurations in which parts are taken and placed [m]."""
 
-RAILS = "leave out --arm: rails make it"
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tour:
+class ArmTour:
     """How an arm brings a part.
 
     Attributes:
@@ -43,7 +43,7 @@ class Tour:
     """
 
     label: str
-    grip: Grip
+    grip: ToolGrip
     goes: JointWay
     brings: JointWay
 
@@ -73,10 +73,10 @@ class ArmPlanner:
             for label, geoms in self.scene.loads.items()
         }
 
-    def tours(self) -> list[Tour]:
+    def tours(self) -> list[ArmTour]:
         """The tours of the arm, in the order of its program. Raises RunError (Unreachable,
         NoWay)."""
-        cell, visits, tours = self.cell, self._visits(), list[Tour]()
+        cell, visits, tours = self.cell, self._visits(), list[ArmTour]()
         for number, label in enumerate(self.labels):
             yaw, taken, placed = visits[number]
             before, (_, _, left) = self.labels[number - 1], visits[number - 1]
@@ -86,7 +86,7 @@ class ArmPlanner:
             self._hold(label, yaw)
             into = self._line(placed, cell.rises(label), label)
             brings = self._leg(over, into[::-1], label, label, label)
-            tours.append(Tour(label, Grip(cell.tip[label], yaw), goes, brings))
+            tours.append(ArmTour(label, ToolGrip(cell.tip[label], yaw), goes, brings))
         return tours
 
     def _hold(self, label: str, yaw: float) -> None:
@@ -127,7 +127,7 @@ class ArmPlanner:
         def clearance(q: Array) -> tuple[Array, Index]:
             return self.scene.margins(q, "", VISITED, spared)
 
-        found = candidates(
+        options = candidates(
             self.chain,
             (np.tile(shown, (len(angles), 1)), turns),
             (np.tile(placed, (len(angles), 1)), turns),
@@ -135,9 +135,9 @@ class ArmPlanner:
             np.zeros(len(self.chain)),
             cell.over_well,
         )
-        if len(found.pairs):
-            return found.pairs, found.grips
-        raise RunError(self._unreachable(label, (shown, placed), turns[0], found.blocked))
+        if len(options.pairs):
+            return options.pairs, options.grips
+        raise RunError(self._unreachable(label, (shown, placed), turns[0], options.blocked))
 
     def _unreachable(
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
@@ -147,8 +147,8 @@ class ArmPlanner:
             why = unreachable(self.chain, place, turn)
             if why is not None:
                 return Diagnostic("Unreachable", why.message(label, self.name), position, RAILS)
-        why = f": {self.scene.say(blocked.pair)} are in each other's way" if blocked else ""
-        message = f"{self.name} has no configuration that brings '{label}'{why}"
+        by = f": {self.scene.say(blocked.pair)} are in each other's way" if blocked else ""
+        message = f"{self.name} has no configuration that brings '{label}'{by}"
         return Diagnostic("Unreachable", message, position, RAILS)
 
     def _later(self, label: str) -> set[str]:
@@ -179,7 +179,7 @@ class ArmPlanner:
         every = self._later("")
         spared = {f"'{label}'", *every}
         ends = {f"'{label}'", CARRIER, f"'{after}'", feeder_name(after), *self._later(before)}
-        found = leg(
+        way = leg(
             self.chain,
             out,
             into,
@@ -187,12 +187,12 @@ class ArmPlanner:
             lambda q: self.scene.margins(q, label, AT_END, ends, held=False),
             self.pace,
         )
-        if isinstance(found, NoWay):
+        if isinstance(way, NoWay):
             message = (
                 f"{self.name} finds no way from '{before}' to '{after}':"
-                f" {self.scene.say(found.pair)} come {found.depth * 1e3:.1f} mm nearer to each"
+                f" {self.scene.say(way.pair)} come {way.depth * 1e3:.1f} mm nearer to each"
                 " other than they may"
             )
             position = self.cell.factory.by_label[after].position
             raise RunError(Diagnostic("NoWay", message, position, RAILS))
-        return found
+        return way

@@ -23,7 +23,7 @@ FAR = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Obstacle:
+class StandingBox:
     """A box along the axes of the world.
 
     Attributes:
@@ -52,7 +52,7 @@ class Scene:
         root: Element,
         prefix: str,
         loads: Mapping[str, Sequence[tuple[Array, Array, Array]]],
-        obstacles: Sequence[Obstacle],
+        obstacles: Sequence[StandingBox],
     ) -> None:
         world = root.find("worldbody")
         assert world is not None
@@ -169,11 +169,11 @@ class Scene:
                 away = mujoco.mj_geomDistance(m, d, one, other, best, None)
                 if away < best:
                     best, pair = away, one * m.ngeom + other
-        own = self._own
+        pairs = self._own
         if label:
-            own = [*own, *((g, k) for g in self.loads[label] for k in self._far_links)]
+            pairs = [*pairs, *((g, k) for g in self.loads[label] for k in self._far_links)]
         best -= need
-        for one, other in own:
+        for one, other in pairs:
             apart = place[one] - place[other]
             if float(apart @ apart) ** 0.5 - bound[one] - bound[other] - OWN < best:
                 away = mujoco.mj_geomDistance(m, d, one, other, FAR, None) - OWN

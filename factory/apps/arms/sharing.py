@@ -23,7 +23,7 @@ of it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Swept:
+class SweptArm:
     """The capsules of an arm on a way.
 
     Attributes:
@@ -35,12 +35,13 @@ class Swept:
     radius: Array
 
     @classmethod
-    def of(cls, scene: Scene, way: JointWay, label: str = "") -> Swept:
+    def of(cls, scene: Scene, way: JointWay, label: str = "") -> SweptArm:
         """Those of an arm on a way, with a part that it holds."""
         m, d = scene.m, scene.d
         geoms = [*scene.links, *scene.loads.get(label, ())]
         balls = np.isin(geoms, [*scene.loads.get(label, ())])
-        long = np.where(balls, 0.0, np.where(m.geom_type[geoms] == BALL, 0.0, m.geom_size[geoms, 1]))
+        round_ = balls | (m.geom_type[geoms] == BALL)
+        long = np.where(round_, 0.0, m.geom_size[geoms, 1])
         radius = np.where(balls, m.geom_rbound[geoms], m.geom_size[geoms, 0])
         rows = []
         for q in way.at(np.linspace(0.0, way.length, SAMPLES))[0]:
@@ -55,7 +56,7 @@ class Swept:
 BALL = int(mujoco.mjtGeom.mjGEOM_SPHERE)
 
 
-def clear_from(leaves: Swept, others: Sequence[Swept]) -> float | None:
+def clear_from(leaves: SweptArm, others: Sequence[SweptArm]) -> float | None:
     """From which share of its way on an arm is clear of others wherever these are on theirs; None
     where it is not even at its end."""
     near = np.zeros(SAMPLES, bool)
@@ -68,7 +69,7 @@ def clear_from(leaves: Swept, others: Sequence[Swept]) -> float | None:
     return 0.0 if not len(last) else float((last[-1] + 1) / (SAMPLES - 1))
 
 
-def _nearer(one: Swept, row: int, other: Swept) -> bool:
+def _nearer(one: SweptArm, row: int, other: SweptArm) -> bool:
     """Whether an arm at a sample comes nearer to another than it may, wherever that is."""
     a, b = one.ends[row], other.ends.reshape(-1, 2, 3)
     radius = np.tile(other.radius, SAMPLES)

@@ -72,7 +72,8 @@ def add_feeders(
         place, code = hanging.places[at], codes[outlet.robot]
         end = OVER if feeder.rises else feeder.high + OVER
         joint = _add_slider(body, at, end, place, code)
-        stops = stops_of(*sorted((hanging.lowest(at), feeder.stroke)), layout.clearance)
+        low, high = sorted((hanging.lowest(at), feeder.stroke))
+        stops = stops_of(low, high, layout.clearance)
         add_drive(actuator, joint, drives[at], stops)
 
 

@@ -51,7 +51,6 @@ class Grip:
         x, y, _ = self.layout.mount(self.robot).reached(hand)[0]
         return ahead - x, aside - y, up
 
-
     @property
     def pose(self) -> tuple[float, ...]:
         """Where the body is in the body that holds it, and a quaternion of how it is turned there

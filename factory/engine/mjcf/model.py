@@ -239,5 +239,5 @@ def _sliders(
 def stroke_ticks(layout: Layout, settings: Settings) -> int:
     """No stroke of a feeder's slider takes more ticks."""
     profile = SpeedProfile(*settings.feeder_limits)
-    strokes = (abs(outlet.feeder.stroke) for outlet in outlets_of(layout))
+    strokes = (outlet.feeder.way for outlet in outlets_of(layout))
     return ceil(profile.rest(max(strokes)) / settings.tick) + 4

@@ -147,16 +147,12 @@ def add_robots(
         section["actuator"].extend(actuators)
 
 
-def _add_chain(
-    layout: Layout, robot: Robot, drive: Drive, section: Mapping[str, Element]
-) -> None:
+def _add_chain(layout: Layout, robot: Robot, drive: Drive, section: Mapping[str, Element]) -> None:
     """The body of a robot whose first axis moves several joints, and their actuators."""
     assert layout.chains is not None
     layout.chains.add(robot.index, section)
     gains = layout.chains.drives(robot.index)
-    for (joint, actuator), (kp, kv, force) in zip(
-        names.moved_along(robot), gains, strict=True
-    ):
+    for (joint, actuator), (kp, kv, force) in zip(names.moved_along(robot), gains, strict=True):
         named = {"name": actuator, "joint": joint}
         each = Drive(kp, kv, force, drive.samples)
         section["actuator"].append(Element("pid", {**named, **each.attributes()}))

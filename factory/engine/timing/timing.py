@@ -197,9 +197,7 @@ class Timing:
         layout, tick = self.layout, self.tick
         slider = GovernedAxis(*self.settings.feeder_limits, tick)
         up, down = (
-            slider.way(abs(feeder_of(layout, self.factory.operations[n].label).stroke)).passes(
-                ROUNDING
-            )
+            slider.way(feeder_of(layout, self.factory.operations[n].label).way).passes(ROUNDING)
             + CALM
             for n in (before, leaf)
         )

@@ -60,19 +60,23 @@ class SoughtCurves(Protocol):
 
 
 class Chains(Protocol):
-    """What a layout says of its robots whose first axes move several joints.
+    """What a layout says of its robots whose first axes move several joints."""
 
-    Attributes:
-        robots: the robots (index).
-        curves: the curves of all of them.
-        sought: the same for one who does not know which of them each follows.
-        timestep: longest timestep with which their drives follow them [s].
-    """
+    @property
+    def robots(self) -> tuple[int, ...]:
+        """The robots (index)."""
 
-    robots: tuple[int, ...]
-    curves: JointCurves
-    sought: SoughtCurves
-    timestep: float
+    @property
+    def curves(self) -> JointCurves:
+        """The curves of all of them."""
+
+    @property
+    def sought(self) -> SoughtCurves:
+        """The same for one who does not know which of them each follows."""
+
+    @property
+    def timestep(self) -> float:
+        """Longest timestep with which their drives follow them [s]."""
 
     def row(self, operation: int, robot: int) -> int:
         """The curve that a robot (index) follows in an operation (index) of its program."""

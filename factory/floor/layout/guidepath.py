@@ -224,6 +224,11 @@ class Feeder:
     stroke: float
 
     @property
+    def way(self) -> float:
+        """How far a part goes [m]."""
+        return abs(self.stroke)
+
+    @property
     def rises(self) -> bool:
         """Whether parts come from below."""
         return self.stroke < 0.0

@@ -248,7 +248,8 @@ class Layout(Keeping, Pictured):
         """
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
-        if self.chains and slot == operation.lowered and operation.robots[slot] in self.chains.robots:
+        chains = self.chains.robots if self.chains else ()
+        if self.chains and slot == operation.lowered and operation.robots[slot] in chains:
             return self.chains.standoff(operation.index)
         path = self.guidepaths[operation.robots[slot]]
         if slot == operation.lowered and not path.travels:
