@@ -15,12 +15,12 @@ from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SINGULAR,
-    away,
     descend,
-    in_range,
     least_singular_value,
+    nearest_in_range,
+    retreat,
     solutions,
-    straight,
+    straight_line,
 )
 from factory.apps.arms.legs import Clearance, NoWay
 
@@ -43,7 +43,7 @@ def partners(chain: SerialChain, q: Array, place: Array, turn: Array) -> tuple[A
         turn: orientation of the tool there (3, 3) or (k, 3, 3).
     """
     other, there = descend(chain, place, turn, q, 80)
-    other, inside = in_range(chain, other, q)
+    other, inside = nearest_in_range(chain, other, q)
     share = np.linspace(0.0, 1.0, 9)[:, None, None]
     values = least_singular_value(chain, q + share * (other - q))
     good = there & inside & (np.minimum(values[0], values[-1]) >= SINGULAR)
@@ -87,23 +87,23 @@ def candidates(
     """
     every = solutions(chain, *takes)
     grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
-    q, good = in_range(chain, np.concatenate(every), near)
+    q, good = nearest_in_range(chain, np.concatenate(every), near)
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
     joined &= good
     grips, q, other = grips[joined], q[joined], other[joined]
     visits = np.concatenate([q, other])
-    lines, straights = straight(chain, visits, away(chain, visits), length)
+    lines, straights = straight_line(chain, visits, retreat(chain, visits), length)
     follows = straights.reshape(2, -1).all(axis=0)
     ends = np.concatenate([lines[:, 0], lines[:, -1]])
     margins, numbers = clearance(ends)
     margin, pair = margins.reshape(4, -1)[:, follows], numbers.reshape(4, -1)[:, follows]
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
-    blocked = _blocked(margin[:, ~clear], pair[:, ~clear])
+    blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
     return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
 
 
-def _blocked(margin: Array, pair: Index) -> NoWay | None:
+def _obstacle(margin: Array, pair: Index) -> NoWay | None:
     """What columns of margins and pairs (4, k) say that is too near."""
     if not margin.size:
         return None

@@ -10,14 +10,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.inverse import away, solutions, straight
+from factory.apps.arms.inverse import retreat, solutions, straight_line
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.slowness import (
     box_average,
-    least_smooth_majorant,
+    enforce_limits,
+    smooth_majorant,
     tool_shares,
     way_through,
-    with_limits,
 )
 from tests.arm_models import ANY_TOOL_SPEED, PACE, configurations, down, random_way, shipped
 
@@ -103,11 +103,11 @@ def test_limits_stretch_no_more_than_they_must(seed: int) -> None:
     assert (need <= push + 1e-9).all() and (push <= 1.6 * need).all()
     assert max(speed.max(), push.max()) <= 1.0
     assert max(speed.max(), push.max()) > 1.0 - 1e-9
-    shorter = way.stretched(0.98)
+    shorter = way.stretch(0.98)
     assert shorter.length == pytest.approx(0.98 * way.length)
-    again = with_limits(shorter, chain, ANY_TOOL_SPEED)
+    again = enforce_limits(shorter, chain, ANY_TOOL_SPEED)
     assert again.length == pytest.approx(way.length, rel=1e-9)
-    slower = with_limits(way, chain, PACE)
+    slower = enforce_limits(way, chain, PACE)
     assert tool_shares(chain, slower, PACE).max() <= 1.0
     assert slower.length > way.length or seed % 2
 
@@ -146,7 +146,7 @@ def ends(chain: SerialChain, seed: int) -> tuple[np.ndarray, np.ndarray]:
     for angle in rng.uniform(-1.2, 1.2, 2):
         place = np.array([0.38 * np.cos(angle), 0.38 * np.sin(angle), 0.05])
         (q,) = solutions(chain, place[None], down(rng.uniform(-1, 1))[None])
-        lines.append(straight(chain, q[:1], away(chain, q[:1]), 0.085)[0][0])
+        lines.append(straight_line(chain, q[:1], retreat(chain, q[:1]), 0.085)[0][0])
     return lines[0], lines[1][::-1]
 
 
@@ -186,10 +186,10 @@ def test_a_box_average_is_that_of_the_polyline() -> None:
 
 def test_a_smooth_majorant_is_nowhere_below() -> None:
     values = np.random.default_rng(0).uniform(size=300)
-    smooth = least_smooth_majorant(values, 7)
+    smooth = smooth_majorant(values, 7)
     assert (smooth >= values - 1e-12).all()
     assert np.abs(np.diff(smooth)).max() <= 1 / 15 + 1e-12
-    assert least_smooth_majorant(np.ones(50), 5) == pytest.approx(np.ones(50))
+    assert smooth_majorant(np.ones(50), 5) == pytest.approx(np.ones(50))
 
 
 def test_random_configurations_are_joined_within_their_limits() -> None:
