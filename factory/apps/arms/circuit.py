@@ -132,15 +132,21 @@ def circuit(options: Sequence[Array], speed: Array) -> list[int]:
         cost(one[:, None, 1], other[None, :, 0])
         for one, other in zip(options, [*options[1:], options[0]], strict=True)
     ]
-    total = np.where(np.eye(len(options[0]), dtype=bool), brings[0], np.inf)
+    rounds = (_round(first, brings, goes) for first in range(len(options[0])))
+    return min(rounds, key=lambda one: one[0])[1]
+
+
+def _round(first: int, brings: Sequence[Array], goes: Sequence[Array]) -> tuple[float, list[int]]:
+    """The least cost of a circuit whose first tour has the configurations `first`, and its
+    choice."""
+    total = np.where(np.arange(len(brings[0])) == first, brings[0], np.inf)
     before: list[Index] = []
     for way, load in zip(goes[:-1], brings[1:], strict=True):
-        every = total[:, :, None] + way
-        before.append(every.argmin(axis=1))
-        total = every.min(axis=1) + load
-    total += goes[-1].T
-    first, last = np.unravel_index(int(total.argmin()), total.shape)
-    chosen = [int(last)]
+        every = total[:, None] + way
+        before.append(every.argmin(axis=0))
+        total = every.min(axis=0) + load
+    total = total + goes[-1][:, first]
+    chosen = [int(total.argmin())]
     for back in reversed(before):
-        chosen.append(int(back[first, chosen[-1]]))
-    return chosen[::-1]
+        chosen.append(int(back[chosen[-1]]))
+    return float(total.min()), chosen[::-1]
