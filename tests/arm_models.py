@@ -12,7 +12,7 @@ from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import Clearance
 from factory.apps.arms.read import MODELS, chain_of, read_chain
-from factory.apps.arms.slowness import with_limits
+from factory.apps.arms.slowness import enforce_limits
 
 PACE = WayLimits()
 
@@ -98,7 +98,7 @@ def random_way(chain: SerialChain, seed: int, share: float = 1.0) -> JointWay:
     x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.0, 7))])
     places = configurations(chain, 8, seed)
     way = JointWay(1e-3 * x, places[0] + share * (places - places[0]))
-    return with_limits(way, chain, ANY_TOOL_SPEED)
+    return enforce_limits(way, chain, ANY_TOOL_SPEED)
 
 
 def ball(chain: SerialChain, center: Array, radius: float) -> Clearance:

@@ -112,7 +112,7 @@ class SerialChain:
     def _turns(self) -> Array:
         """Matrices (3, n, 3, 3): a joint turns its frame by the first + sin q · the second +
         (1 - cos q) · the third (Rodrigues' formula)."""
-        cross = crossed(self.axis) * ~self.slides[:, None, None]
+        cross = cross_matrix(self.axis) * ~self.slides[:, None, None]
         return np.stack([self.turn, self.turn @ cross, self.turn @ cross @ cross])
 
     def frames(self, q: Array) -> tuple[Array, Array]:
@@ -232,7 +232,7 @@ class SerialChain:
         rows = [self.lever(body.frame, body.points, body.radius) for body in each]
         return np.array(rows).reshape(len(rows), len(self))
 
-    def carrying(self, mass: float, center: Array, moment: Array) -> SerialChain:
+    def with_payload(self, mass: float, center: Array, moment: Array) -> SerialChain:
         """The chain with a payload at its tool.
 
         Args:
@@ -242,10 +242,10 @@ class SerialChain:
         """
         at = self.tool_place + self.tool_turn @ center
         tensor = self.tool_turn @ moment @ self.tool_turn.T
-        return replace(self, inertia=with_load(self.inertia, mass, at, tensor))
+        return replace(self, inertia=add_load(self.inertia, mass, at, tensor))
 
 
-def with_load(inertia: LinkInertia, mass: float, at: Array, moment: Array) -> LinkInertia:
+def add_load(inertia: LinkInertia, mass: float, at: Array, moment: Array) -> LinkInertia:
     """The inertia of links of which the last bears a load.
 
     Args:
@@ -276,7 +276,7 @@ def steiner(mass: float, offset: Array) -> Array:
     return np.asarray(mass * (offset @ offset * np.eye(3) - np.outer(offset, offset)))
 
 
-def crossed(vectors: Array) -> Array:
+def cross_matrix(vectors: Array) -> Array:
     """The matrices (..., 3, 3) of the cross product with vectors from the left.
 
     Args:

@@ -15,12 +15,12 @@ from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SINGULAR,
-    away,
     descend,
-    in_range,
     least_singular_value,
+    nearest_in_range,
+    retreat,
     solutions,
-    straight,
+    straight_line,
 )
 from factory.apps.arms.legs import Clearance, NoWay
 
@@ -43,7 +43,7 @@ def partners(chain: SerialChain, q: Array, place: Array, turn: Array) -> tuple[A
         turn: orientation of the tool there (3, 3) or (k, 3, 3).
     """
     other, there = descend(chain, place, turn, q, 80)
-    other, inside = in_range(chain, other, q)
+    other, inside = nearest_in_range(chain, other, q)
     share = np.linspace(0.0, 1.0, 9)[:, None, None]
     values = least_singular_value(chain, q + share * (other - q))
     good = there & inside & (np.minimum(values[0], values[-1]) >= SINGULAR)
@@ -87,23 +87,23 @@ def candidates(
     """
     every = solutions(chain, *takes)
     grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
-    q, good = in_range(chain, np.concatenate(every), near)
+    q, good = nearest_in_range(chain, np.concatenate(every), near)
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
     joined &= good
     grips, q, other = grips[joined], q[joined], other[joined]
     visits = np.concatenate([q, other])
-    lines, straights = straight(chain, visits, away(chain, visits), length)
+    lines, straights = straight_line(chain, visits, retreat(chain, visits), length)
     follows = straights.reshape(2, -1).all(axis=0)
     ends = np.concatenate([lines[:, 0], lines[:, -1]])
     margins, numbers = clearance(ends)
     margin, pair = margins.reshape(4, -1)[:, follows], numbers.reshape(4, -1)[:, follows]
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
-    blocked = _blocked(margin[:, ~clear], pair[:, ~clear])
+    blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
     return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
 
 
-def _blocked(margin: Array, pair: Index) -> NoWay | None:
+def _obstacle(margin: Array, pair: Index) -> NoWay | None:
     """What columns of margins and pairs (4, k) say that is too near."""
     if not margin.size:
         return None
@@ -132,15 +132,21 @@ def circuit(options: Sequence[Array], speed: Array) -> list[int]:
         cost(one[:, None, 1], other[None, :, 0])
         for one, other in zip(options, [*options[1:], options[0]], strict=True)
     ]
-    total = np.where(np.eye(len(options[0]), dtype=bool), brings[0], np.inf)
+    rounds = (_round(first, brings, goes) for first in range(len(options[0])))
+    return min(rounds, key=lambda one: one[0])[1]
+
+
+def _round(first: int, brings: Sequence[Array], goes: Sequence[Array]) -> tuple[float, list[int]]:
+    """The least cost of a circuit whose first tour has the configurations `first`, and its
+    choice."""
+    total = np.where(np.arange(len(brings[0])) == first, brings[0], np.inf)
     before: list[Index] = []
     for way, load in zip(goes[:-1], brings[1:], strict=True):
-        every = total[:, :, None] + way
-        before.append(every.argmin(axis=1))
-        total = every.min(axis=1) + load
-    total += goes[-1].T
-    first, last = np.unravel_index(int(total.argmin()), total.shape)
-    chosen = [int(last)]
+        every = total[:, None] + way
+        before.append(every.argmin(axis=0))
+        total = every.min(axis=0) + load
+    total = total + goes[-1][:, first]
+    chosen = [int(total.argmin())]
     for back in reversed(before):
-        chosen.append(int(back[first, chosen[-1]]))
-    return chosen[::-1]
+        chosen.append(int(back[chosen[-1]]))
+    return float(total.min()), chosen[::-1]

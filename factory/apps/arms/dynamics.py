@@ -48,7 +48,7 @@ def torques(chain: SerialChain, q: Array, speed: Array, acceleration: Array) -> 
         momentum = (tensor @ spin[..., None])[..., 0]
         couple[..., j, :] = (tensor @ turn_rate[..., None])[..., 0] + cross(spin, momentum)
     couple += cross(arm, force)
-    return _borne(chain, place, axis, force, couple) + chain.inertia.rotor * acceleration
+    return _joint_torques(chain, place, axis, force, couple) + chain.inertia.rotor * acceleration
 
 
 def weights(chain: SerialChain, q: Array, gravity: Array = GRAVITY) -> Array:
@@ -63,10 +63,12 @@ def weights(chain: SerialChain, q: Array, gravity: Array = GRAVITY) -> Array:
     axis = (turn[..., 1:, :, :] @ chain.axis[..., None])[..., 0]
     arm = (turn[..., 1:, :, :] @ chain.inertia.weight_center[..., None])[..., 0]
     force = np.broadcast_to(-chain.inertia.weight[:, None] * gravity, arm.shape)
-    return _borne(chain, place, axis, force, cross(arm, force))
+    return _joint_torques(chain, place, axis, force, cross(arm, force))
 
 
-def _borne(chain: SerialChain, place: Array, axis: Array, force: Array, couple: Array) -> Array:
+def _joint_torques(
+    chain: SerialChain, place: Array, axis: Array, force: Array, couple: Array
+) -> Array:
     """Torques (..., n) of the joints that bear forces and couples (..., n, 3) at the origins of
     their frames and of all after them."""
     borne = np.zeros(axis.shape[:-1])

@@ -67,8 +67,8 @@ def _rotation(turn: Array, now: Array) -> Array:
     wide = np.flatnonzero(cosine < 0)
     size = np.linalg.norm(sine[wide], axis=-1)
     angle = np.arctan2(size, cosine[wide])
-    straight = np.where(size[:, None] > 1e-9, sine[wide], [1.0, 0.0, 0.0])
-    sine[wide] = straight * (angle / np.linalg.norm(straight, axis=-1))[:, None]
+    sense = np.where(size[:, None] > 1e-9, sine[wide], [1.0, 0.0, 0.0])
+    sine[wide] = sense * (angle / np.linalg.norm(sense, axis=-1))[:, None]
     return np.asarray(sine)
 
 
@@ -83,7 +83,7 @@ def _step(columns: Array, error: Array) -> Array:
     return np.asarray(step * np.minimum(1.0, STRIDE / np.maximum(longest, 1e-300)))
 
 
-def in_range(chain: SerialChain, q: Array, near: Array) -> tuple[Array, Truth]:
+def nearest_in_range(chain: SerialChain, q: Array, near: Array) -> tuple[Array, Truth]:
     """Configurations (m, n) with hinges moved by whole turns, within their limits as near to a
     reference as they come, and whether all joints are within their limits (m,).
 
@@ -138,7 +138,7 @@ def solutions(
         np.repeat(turns, count, axis=0),
         np.tile(start, (len(places), 1)),
     )
-    q, inside = in_range(chain, q, np.zeros(len(chain)))
+    q, inside = nearest_in_range(chain, q, np.zeros(len(chain)))
     good, q = (there & inside).reshape(-1, count), q.reshape(-1, count, len(chain))
     return tuple(_different(chain, row[mask]) for row, mask in zip(q, good, strict=True))
 
@@ -169,7 +169,7 @@ def least_singular_value(chain: SerialChain, q: Array) -> Array:
     return np.asarray(np.linalg.svd(scaled, compute_uv=False)[..., -1])
 
 
-def straight(
+def straight_line(
     chain: SerialChain, q: Array, way: Array, length: float, count: int = 25
 ) -> tuple[Array, Truth]:
     """Configurations (m, count, n) at equal distances along straight lines of the tool, which keeps
@@ -187,13 +187,13 @@ def straight(
     for height in np.linspace(0.0, length, count)[1:]:
         ahead = 2 * rows[-1] - rows[-2] if len(rows) > 1 else rows[-1]
         after, there = descend(chain, place + height * way, turn, ahead, 20)
-        _, inside = in_range(chain, after, after)
+        _, inside = nearest_in_range(chain, after, after)
         good &= there & inside & (np.abs(after - rows[-1]).max(axis=-1) < 5.0 / count)
         rows.append(after)
     return np.stack(rows, axis=1), good
 
 
-def away(chain: SerialChain, q: Array) -> Array:
+def retreat(chain: SerialChain, q: Array) -> Array:
     """The directions (..., 3) in the base frame in which the tool leaves what it is at: against its
     z.
 

@@ -130,7 +130,7 @@ class JointWay:
         push = second * pace.speed**2 + first * pace.acceleration
         return speed.max(axis=0), (push / limits.acceleration).max(axis=0)
 
-    def stretched(self, share: float) -> JointWay:
+    def stretch(self, share: float) -> JointWay:
         """The same curve on a longer coordinate.
 
         Args:

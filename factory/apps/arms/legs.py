@@ -16,7 +16,7 @@ import numpy as np
 from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.joint_way import JointWay, WayLimits
-from factory.apps.arms.slowness import way_through
+from factory.apps.arms.slowness import STIFF, way_through
 
 Clearance = Callable[[Array], tuple[Array, Index]]
 """From configurations (m, n) to their margins (m,), the distance to what is nearest less the
@@ -75,7 +75,7 @@ class _Search:
         pair = max(sorted(self.pairs), key=lambda number: len(self.pairs[number]))
         return NoWay(pair, max(self.pairs[pair]), sum(map(len, self.pairs.values())))
 
-    def shortened(self, path: list[Array], rng: np.random.Generator) -> list[Array]:
+    def shorten(self, path: list[Array], rng: np.random.Generator) -> list[Array]:
         """A polyline with shortcuts at random."""
         for _ in range(SHORTCUTS):
             if len(path) < 3:
@@ -121,15 +121,15 @@ def transfer(
     if search.clear(a, b):
         return line(a, b)
     ends = clearance(np.stack([a, b]))[0] >= reserve
-    path = _connected(a, b, search, limits, rng, rounds) if ends.all() else None
+    path = _connect(a, b, search, limits, rng, rounds) if ends.all() else None
     if path is None:
         return search.no_way()
-    path = search.shortened(path, rng)
+    path = search.shorten(path, rng)
     rows = [line(p, q)[1:] for p, q in pairwise(path)]
     return np.concatenate([a[None], *rows])
 
 
-def _connected(
+def _connect(
     a: Array,
     b: Array,
     search: _Search,
@@ -179,6 +179,7 @@ def leg(
     ends: Clearance,
     pace: WayLimits,
     seed: int = 0,
+    stiff: float = STIFF,
 ) -> JointWay | NoWay:
     """The way from one visit to the next, or why there is none.
 
@@ -190,6 +191,7 @@ def leg(
         ends: of configurations on the straight beginning and end.
         pace: limits of the coordinate and the tool.
         seed: of the random search.
+        stiff: share of the straight beginning and end that is not rounded.
     """
     limits = chain.limits.low, chain.limits.high
     middle = transfer(out[-1], into[0], clearance, limits, seed)
@@ -197,7 +199,7 @@ def leg(
         return middle
     blocked: NoWay | None = None
     for rounding in ROUNDINGS:
-        way = way_through(chain, out, middle, into, pace, rounding=rounding)
+        way = way_through(chain, out, middle, into, pace, stiff, rounding)
         blocked = obstruction(way, clearance, ends)
         if blocked is None:
             return way

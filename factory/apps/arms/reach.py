@@ -13,8 +13,8 @@ from factory.apps.arms.inverse import (
     SINGULAR,
     STEPS,
     descend,
-    in_range,
     least_singular_value,
+    nearest_in_range,
     solutions,
 )
 
@@ -65,7 +65,7 @@ class Unreachable:
         return f"{where}; it comes to {self.reach:.3f} m there, {self.short * 1e3:.0f} mm short"
 
 
-def unreachable(chain: SerialChain, place: Array, turn: Array) -> Unreachable | None:
+def diagnose_reach(chain: SerialChain, place: Array, turn: Array) -> Unreachable | None:
     """Why an arm does not reach a pose, from a search on the ray from the axis of its base through
     it; None where it does, with a least singular value of at least SINGULAR.
 
@@ -108,7 +108,7 @@ def _farthest(chain: SerialChain, places: Array, turn: Array, q: Array) -> tuple
     before them, and its configurations at the last."""
     start = np.tile(q, (len(places), 1))
     rows, there = descend(chain, np.repeat(places, len(q), axis=0), turn, start, 3 * STEPS)
-    rows, inside = in_range(chain, rows, start)
+    rows, inside = nearest_in_range(chain, rows, start)
     good = (there & inside).reshape(len(places), len(q))
     reached = int(np.argmin(np.append(good.any(axis=1), False)))
     if not reached:

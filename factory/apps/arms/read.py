@@ -38,8 +38,8 @@ def read_chain(
     try:
         m = mujoco.MjModel.from_xml_path(str(path))
     except ValueError as error:
-        raise _not_compiled(path.name, error) from error
-    return _Reading(m, path.name, tool, values or {}).chain()
+        raise _compile_error(path.name, error) from error
+    return _Reader(m, path.name, tool, values or {}).chain()
 
 
 def chain_of(
@@ -60,20 +60,20 @@ def chain_of(
     try:
         m = mujoco.MjModel.from_xml_string(xml)
     except ValueError as error:
-        raise _not_compiled(name, error) from error
-    return _Reading(m, name, tool, values or {}).chain()
+        raise _compile_error(name, error) from error
+    return _Reader(m, name, tool, values or {}).chain()
 
 
-def _bad(file: str, message: str, hint: str) -> InputError:
+def _error(file: str, message: str, hint: str) -> InputError:
     return InputError(Diagnostic("BadArm", message, Position(file, 1, 1), hint))
 
 
-def _not_compiled(file: str, error: ValueError) -> InputError:
+def _compile_error(file: str, error: ValueError) -> InputError:
     words = " ".join(str(error).split())
-    return _bad(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
+    return _error(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
 
 
-class _Reading:
+class _Reader:
     """The reading of one compiled model."""
 
     def __init__(
@@ -95,10 +95,10 @@ class _Reading:
         self.path = self._path(int(m.site_bodyid[self.site]))
         self._refuse_branches()
         self.base = 0 if m.body_jntnum[self.path[1]] else self.path[1]
-        self.place, self.turn = self._at_zero()
+        self.place, self.turn = self._poses()
 
     def _refuse(self, message: str, hint: str) -> None:
-        raise _bad(self.file, message, hint)
+        raise _error(self.file, message, hint)
 
     def _joint(self, number: int) -> str:
         return f"joint '{self.m.joint(number).name or number + 1}'"
@@ -136,7 +136,7 @@ class _Reading:
             message = f"is not one chain: {self._joint(off[0])} is not between base and tool"
             self._refuse(message, hint)
 
-    def _at_zero(self) -> tuple[Array, Array]:
+    def _poses(self) -> tuple[Array, Array]:
         """Places (bodies, 3) and orientations (bodies, 3, 3) of all bodies in the frame of the
         base, every joint where the file draws it."""
         place, turn = np.zeros((self.m.nbody, 3)), np.tile(np.eye(3), (self.m.nbody, 1, 1))

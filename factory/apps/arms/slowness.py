@@ -19,6 +19,9 @@ STEP, FEWEST, MOST = 0.0015, 600, 4000
 
 KNOTS = 200
 
+STIFF = 0.47
+"""Share of straight beginnings and ends that is not rounded: 40 of 85 mm."""
+
 RESERVE = 0.93, 0.98
 """Shares of acceleration and speed that the passes use: the spline differs from its samples."""
 
@@ -53,7 +56,7 @@ def box_average(t: Array, path: Array, half: Array) -> Array:
     return mean
 
 
-def least_smooth_majorant(values: Array, count: int) -> Array:
+def smooth_majorant(values: Array, count: int) -> Array:
     """A smooth sequence (m,) that is nowhere below another: the mean over a window of the greatest
     over that window.
 
@@ -74,7 +77,7 @@ def way_through(
     middle: Array,
     into: Array,
     pace: WayLimits,
-    stiff: float = 0.47,
+    stiff: float = STIFF,
     rounding: float = 0.1,
 ) -> JointWay:
     """The way along a straight beginning, a transfer and a straight end, with (∗).
@@ -101,7 +104,7 @@ def way_through(
     for _ in range(2):
         half = np.clip(np.minimum(t - ends[0], ends[1] - t) / 2, 0.0, rounding)
         path = box_average(t, path, half)
-    return with_limits(_through_samples(chain, t, path, ends, pace), chain, pace)
+    return enforce_limits(_through_samples(chain, t, path, ends, pace), chain, pace)
 
 
 def _through_samples(
@@ -116,7 +119,7 @@ def _through_samples(
     return JointWay(x[pick], path[pick], off, hover)
 
 
-def with_limits(way: JointWay, chain: SerialChain, pace: WayLimits) -> JointWay:
+def enforce_limits(way: JointWay, chain: SerialChain, pace: WayLimits) -> JointWay:
     """A way, stretched as little as (∗) and the tool's speed need.
 
     Args:
@@ -133,7 +136,7 @@ def with_limits(way: JointWay, chain: SerialChain, pace: WayLimits) -> JointWay:
         float(((push + bend) / (2 * most)).max()),
         float(tool_shares(chain, way, pace).max()),
     )
-    return way.stretched(share * (1 + 1e-12)) if share > 1.0 else way
+    return way.stretch(share * (1 + 1e-12)) if share > 1.0 else way
 
 
 def tool_shares(chain: SerialChain, way: JointWay, pace: WayLimits, count: int = 400) -> Array:
@@ -176,9 +179,9 @@ def coordinates(chain: SerialChain, t: Array, path: Array, pace: WayLimits) -> A
     rate = _rates(chain, t, path, pace)
     rate = np.minimum(rate, RESERVE[1] * _least_ratio(chain.limits.speed, first))
     rate = np.minimum(rate, _bend_rates(first * ratio, second, most))
-    rate = 1 / least_smooth_majorant(1 / rate, round(SMOOTH / step))
+    rate = 1 / smooth_majorant(1 / rate, round(SMOOTH / step))
     square = _passes(rate**2, first, second, most, ratio, step)
-    slowness = least_smooth_majorant(pace.speed / np.sqrt(square), round(SMOOTH / step / 2))
+    slowness = smooth_majorant(pace.speed / np.sqrt(square), round(SMOOTH / step / 2))
     return np.concatenate([[0.0], np.cumsum((slowness[1:] + slowness[:-1]) / 2 * step)])
 
 

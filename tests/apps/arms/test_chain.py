@@ -62,7 +62,7 @@ def test_a_payload_is_a_body_at_the_tool(seed: int) -> None:
     chain, _, _ = both(seed)
     rng = np.random.default_rng(seed)
     center, moment = rng.normal(size=3) * 0.1, np.diag([0.01, 0.02, 0.015])
-    loaded = chain.carrying(2.0, center, moment)
+    loaded = chain.with_payload(2.0, center, moment)
     q, speed = configurations(chain, 1, seed), rng.normal(size=(1, len(chain)))
     _, turn, columns = chain.tool_and_jacobian(q)
     velocity, spin = np.split(columns[0] @ speed[0], 2)
@@ -107,7 +107,7 @@ def test_a_lever_is_the_length_of_the_chain() -> None:
 
 def test_torque_shares_are_those_of_the_worst_corner() -> None:
     """As great as at any speed and acceleration within the limits, and met at one of them."""
-    chain = shipped("six").carrying(1.0, np.array([0.0, 0.0, 0.05]), np.eye(3) * 1e-3)
+    chain = shipped("six").with_payload(1.0, np.array([0.0, 0.0, 0.05]), np.eye(3) * 1e-3)
     way = random_way(chain, 5)
     share = torque_share(chain, way, PACE)
     g, first, second = way.at(np.linspace(0.0, way.length, 300))
@@ -126,7 +126,7 @@ def test_a_heavier_payload_needs_more_torque() -> None:
     way = JointWay(np.linspace(0.0, 1.0, 4), np.linspace([0, 1.5, 0, 0, 0, 0], [1.0] * 6, 4))
 
     def share(mass: float) -> float:
-        loaded: SerialChain = chain.carrying(mass, np.zeros(3), np.zeros((3, 3)))
+        loaded: SerialChain = chain.with_payload(mass, np.zeros(3), np.zeros((3, 3)))
         return float(torque_share(loaded, way, PACE)[1])
 
     assert share(5.0) > share(1.0) > share(1e-9)

@@ -9,6 +9,7 @@ from scipy.optimize import nnls
 from factory.apps.arms.chain import ConvexBody, SerialChain
 from factory.apps.arms.growth import growths, samples, travels
 from factory.apps.arms.joint_way import JointWay
+from factory.apps.arms.read import chain_of
 from tests.arm_models import both, configurations, random_way, shipped
 
 WITHIN = np.linspace(0.0, 1.0, 9)[1:-1]
@@ -66,6 +67,21 @@ def test_the_growth_is_used() -> None:
         share = off_chords(way, chain, corner(chain), x)
         best = max(best, float((share / growths(chain, way, x, [corner(chain)])[:, 0]).max()))
     assert 0.4 < best <= 1.0
+
+
+def test_the_growth_is_met_by_an_arm_that_is_stretched_out() -> None:
+    """Where all joints turn the same way, its far end bends as much as Lemma 2 lets it."""
+    limits = '<numeric name="speed" data="1 1 1"/><numeric name="acceleration" data="1 1 1"/>'
+    hinge = '<joint axis="0 0 1" range="-90 90"/><geom size="0.01"/>'
+    link = f'<body pos="0.3 0 0">{hinge}'
+    text = f'{3 * link}<site name="tool" pos="0.3 0 0"/>{3 * "</body>"}'
+    chain = chain_of(f"<mujoco><custom>{limits}</custom><worldbody>{text}</worldbody></mujoco>")
+    speeds = np.array([0.3, 0.8, 0.5])
+    way = JointWay(np.linspace(-0.1, 0.1, 5) + 0.1, np.outer(np.linspace(-0.1, 0.1, 5), speeds))
+    x = np.array([0.08, 0.12])
+    tip = ConvexBody("tip", 3, chain.tool_place[None])
+    share = off_chords(way, chain, tip, x) / growths(chain, way, x, [tip])[:, 0]
+    assert 0.98 < share[0] <= 1.0
 
 
 def distance_to_hull(point: np.ndarray, corners: np.ndarray) -> float:

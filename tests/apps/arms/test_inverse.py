@@ -11,15 +11,15 @@ from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SINGULAR,
     TURN,
-    away,
     descend,
-    in_range,
     least_singular_value,
+    nearest_in_range,
+    retreat,
     seeds,
     solutions,
-    straight,
+    straight_line,
 )
-from factory.apps.arms.reach import Unreachable, unreachable
+from factory.apps.arms.reach import Unreachable, diagnose_reach
 from tests.arm_models import both, configurations, down, shipped
 
 ARMS = ("six", "scara")
@@ -101,17 +101,18 @@ def test_random_chains_come_back_to_their_poses(seed: int) -> None:
 def test_hinges_turn_to_the_nearest_in_their_range() -> None:
     chain = shipped("six")
     q = configurations(chain, 50, 0)
-    rng = np.random.default_rng(0)
-    near = rng.uniform(-6, 6, q.shape)
-    moved, inside = in_range(chain, q, near)
-    assert inside.all() and (np.abs(moved) <= chain.limits.high).all()
+    near = np.random.default_rng(1).uniform(-6, 6, q.shape)
+    moved, inside = nearest_in_range(chain, q, near)
+    assert inside.all() and (np.abs(moved) <= chain.limits.high).all() and (moved != q).any()
     assert np.abs((moved - q) / TURN % 1.0 - 0.5).min() > 0.5 - 1e-9
     for turn in (-TURN, TURN):
         other = moved + turn
         possible = np.abs(other) <= chain.limits.high
         assert (np.abs(other - near) >= np.abs(moved - near) - 1e-9)[possible].all()
     narrow = replace(chain.limits, low=np.full(6, 0.5), high=np.full(6, 0.6))
-    _, inside = in_range(replace(chain, limits=narrow), np.full((2, 6), [[0.55], [0.65]]), near[:2])
+    _, inside = nearest_in_range(
+        replace(chain, limits=narrow), np.full((2, 6), [[0.55], [0.65]]), near[:2]
+    )
     assert inside.tolist() == [True, False]
 
 
@@ -141,14 +142,14 @@ def test_singular_values_do_not_depend_on_size_and_vanish_in_singular_configurat
 def test_a_straight_line_is_straight_and_keeps_the_orientation() -> None:
     chain = shipped("six")
     (q,) = solutions(chain, np.array([[0.3, 0.35, 0.1]]), down(0.2)[None])
-    rows, good = straight(chain, q, away(chain, q), 0.085)
+    rows, good = straight_line(chain, q, retreat(chain, q), 0.085)
     assert good.all() and rows.shape == (8, 25, 6)
-    assert np.abs(away(chain, q) - [0.0, 0.0, 1.0]).max() < 1e-8
+    assert np.abs(retreat(chain, q) - [0.0, 0.0, 1.0]).max() < 1e-8
     at, turn = chain.tool(rows)
     heights = np.linspace(0.0, 0.085, 25)
     assert np.abs(at - ([0.3, 0.35, 0.1] + heights[:, None] * [0, 0, 1])).max() < 1e-8
     assert np.abs(turn - down(0.2)).max() < 1e-8
-    _, good = straight(chain, q, np.array([0.8, 0.6, 0.0]), 0.6)
+    _, good = straight_line(chain, q, np.array([0.8, 0.6, 0.0]), 0.6)
     assert not good.any()
 
 
@@ -157,7 +158,7 @@ def test_what_is_too_far_is_so_many_millimetres_short(distance: float) -> None:
     """The edge is reached, and 1 mm beyond it is not."""
     chain = shipped("six")
     place = np.array([0.6, 0.8, 0.0]) * distance + [0.0, 0.0, 0.15]
-    why = unreachable(chain, place, down(0.4))
+    why = diagnose_reach(chain, place, down(0.4))
     assert why is not None and why.reach is not None
     assert why.distance == pytest.approx(distance) and 0.5 < why.reach < distance
     for reach, there in ((why.reach - 5e-4, True), (why.reach + 5e-4, False)):
@@ -173,16 +174,16 @@ def test_what_is_too_far_is_so_many_millimetres_short(distance: float) -> None:
 
 def test_what_is_too_near_too_high_or_nearly_singular_is_told_apart() -> None:
     chain = shipped("six")
-    near = unreachable(chain, np.array([0.0, 0.1, 0.15]), down(0.0))
+    near = diagnose_reach(chain, np.array([0.0, 0.1, 0.15]), down(0.0))
     assert near is not None and near.reach is not None and near.reach > 0.13
     assert near.message("lid", "left").endswith(f"it comes no nearer than {near.reach:.3f} m there")
-    high = unreachable(chain, np.array([0.2, 0.1, 2.0]), down(0.0))
+    high = diagnose_reach(chain, np.array([0.2, 0.1, 2.0]), down(0.0))
     assert high == Unreachable(pytest.approx(np.hypot(0.2, 0.1)), 2.0, None)
     assert high.message("a", "b").endswith("no place at that height so turned")
-    edge = unreachable(chain, np.array([1.0, 0.0, 0.15]), down(0.0))
+    edge = diagnose_reach(chain, np.array([1.0, 0.0, 0.15]), down(0.0))
     assert edge is not None and edge.reach is not None
-    bent = unreachable(chain, np.array([edge.reach - 1e-3, 0.0, 0.15]), down(0.0))
+    bent = diagnose_reach(chain, np.array([edge.reach - 1e-3, 0.0, 0.15]), down(0.0))
     assert bent is not None and bent.singular is not None and bent.singular < SINGULAR
     words = "'lid' is reached by left only within 0.08 of a singular configuration"
     assert bent.message("lid", "left") == words
-    assert unreachable(chain, np.array([0.3, 0.35, 0.15]), down(0.0)) is None
+    assert diagnose_reach(chain, np.array([0.3, 0.35, 0.15]), down(0.0)) is None

@@ -10,14 +10,14 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.inverse import away, solutions, straight
+from factory.apps.arms.inverse import retreat, solutions, straight_line
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.slowness import (
     box_average,
-    least_smooth_majorant,
+    enforce_limits,
+    smooth_majorant,
     tool_shares,
     way_through,
-    with_limits,
 )
 from tests.arm_models import ANY_TOOL_SPEED, PACE, configurations, down, random_way, shipped
 
@@ -47,7 +47,7 @@ def test_no_joint_is_above_its_limits_on_random_ways(name: str) -> None:
     chain, rng = shipped(name), np.random.default_rng(0)
     most = np.zeros(2)
     for seed in range(25):
-        way = random_way(chain, seed, (1.0, 0.1)[seed % 2])
+        way = random_way(chain, seed, (1.0, 0.03)[seed % 2])
         rows = zip(*references(rng, way.length), strict=True)
         x, v, push = (np.concatenate(row) for row in rows)
         _, first, second = way.at(x)
@@ -55,7 +55,7 @@ def test_no_joint_is_above_its_limits_on_random_ways(name: str) -> None:
         gain = np.abs(first * push[:, None] + second * (v**2)[:, None])
         most = np.maximum(most, [speed.max(), (gain / chain.limits.acceleration).max()])
     assert (most <= 1.0 + 1e-9).all()
-    assert (most > [0.9, 0.6]).all()
+    assert (most > 0.75).all()
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -93,17 +93,23 @@ def test_bounds_hold_between_any_coordinates_and_are_met(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(10))
 def test_limits_stretch_no_more_than_they_must(seed: int) -> None:
     chain = shipped("six")
-    way = random_way(chain, seed)
+    way = random_way(chain, seed, (1.0, 0.03)[seed % 2])
     speed, push = way.shares(chain.limits, PACE)
+    _, first, second = way.at(np.linspace(0.0, way.length, 3000))
+    fast = np.abs(first) * PACE.speed / chain.limits.speed
+    gain = np.abs(first) * PACE.acceleration + np.abs(second) * PACE.speed**2
+    assert (fast.max(axis=0) <= speed + 1e-9).all()
+    need = (gain / chain.limits.acceleration).max(axis=0)
+    assert (need <= push + 1e-9).all() and (push <= 1.6 * need).all()
     assert max(speed.max(), push.max()) <= 1.0
     assert max(speed.max(), push.max()) > 1.0 - 1e-9
-    shorter = way.stretched(0.98)
+    shorter = way.stretch(0.98)
     assert shorter.length == pytest.approx(0.98 * way.length)
-    again = with_limits(shorter, chain, ANY_TOOL_SPEED)
+    again = enforce_limits(shorter, chain, ANY_TOOL_SPEED)
     assert again.length == pytest.approx(way.length, rel=1e-9)
-    slower = with_limits(way, chain, PACE)
-    assert tool_shares(chain, slower, PACE).max() == pytest.approx(1.0, rel=1e-6)
-    assert slower.length > way.length
+    slower = enforce_limits(way, chain, PACE)
+    assert tool_shares(chain, slower, PACE).max() <= 1.0
+    assert slower.length > way.length or seed % 2
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -140,7 +146,7 @@ def ends(chain: SerialChain, seed: int) -> tuple[np.ndarray, np.ndarray]:
     for angle in rng.uniform(-1.2, 1.2, 2):
         place = np.array([0.38 * np.cos(angle), 0.38 * np.sin(angle), 0.05])
         (q,) = solutions(chain, place[None], down(rng.uniform(-1, 1))[None])
-        lines.append(straight(chain, q[:1], away(chain, q[:1]), 0.085)[0][0])
+        lines.append(straight_line(chain, q[:1], retreat(chain, q[:1]), 0.085)[0][0])
     return lines[0], lines[1][::-1]
 
 
@@ -154,7 +160,7 @@ def test_a_way_has_straight_ends_slow_ends_and_uses_its_limits(name: str, seed: 
     assert np.abs(g - [out[0], into[-1]]).max() < 1e-12
     for low, high, end in ((0.0, way.off, 0), (way.hover, way.length, -1)):
         at, turn = chain.tool(way.at(np.linspace(low, high, 200))[0])
-        assert np.abs(at[:, :2] - at[end, :2]).max() < 2e-5
+        assert np.abs(at[:, :2] - at[end, :2]).max() < 1e-6
         assert np.abs(turn - turn[end]).max() < 1e-3
         assert np.ptp(at[:, 2]) > 0.035
     speed, push = way.shares(chain.limits, PACE)
@@ -180,10 +186,10 @@ def test_a_box_average_is_that_of_the_polyline() -> None:
 
 def test_a_smooth_majorant_is_nowhere_below() -> None:
     values = np.random.default_rng(0).uniform(size=300)
-    smooth = least_smooth_majorant(values, 7)
+    smooth = smooth_majorant(values, 7)
     assert (smooth >= values - 1e-12).all()
     assert np.abs(np.diff(smooth)).max() <= 1 / 15 + 1e-12
-    assert least_smooth_majorant(np.ones(50), 5) == pytest.approx(np.ones(50))
+    assert smooth_majorant(np.ones(50), 5) == pytest.approx(np.ones(50))
 
 
 def test_random_configurations_are_joined_within_their_limits() -> None:

@@ -11,7 +11,13 @@ import pytest
 from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, partners
-from factory.apps.arms.inverse import SINGULAR, away, least_singular_value, solutions, straight
+from factory.apps.arms.inverse import (
+    SINGULAR,
+    least_singular_value,
+    retreat,
+    solutions,
+    straight_line,
+)
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.legs import CHECKS, NoWay, leg, line, obstruction, transfer
 from tests.arm_models import PACE, ball, down, nothing, shipped
@@ -24,7 +30,7 @@ def visit(chain: SerialChain, place: Array) -> Array:
     (q,) = solutions(chain, place[None], down(0.0)[None])
     high = chain.frames(q)[0][:, 3, 2]
     start = q[[int(high.argmax())]]
-    return np.asarray(straight(chain, start, away(chain, start), 0.085)[0][0])
+    return np.asarray(straight_line(chain, start, retreat(chain, start), 0.085)[0][0])
 
 
 def limits(chain: SerialChain) -> tuple[Array, Array]:
@@ -72,7 +78,7 @@ def test_where_there_is_no_way_the_pair_that_blocked_is_named() -> None:
 
     def clearance(q: Array) -> tuple[Array, Index]:
         margin = np.abs(q[:, 0] - wall) - 0.05
-        return margin, np.where(np.abs(q[:, 0] - wall) < 0.2, 3, 1)
+        return margin, np.where(np.abs(q[:, 0] - wall) < 0.04, 3, 1)
 
     blocked = transfer(a, b, clearance, limits(chain), rounds=60)
     assert isinstance(blocked, NoWay)
@@ -136,11 +142,13 @@ def test_candidates_are_clear_and_what_is_not_is_named() -> None:
         at, now = chain.tool(every.pairs[:, k])
         assert np.abs(at - place[every.grips]).max() < 1e-8
         assert np.abs(now - turn[every.grips]).max() < 1e-8
-    elbow = chain.frames(every.pairs[0, 0])[0][3]
-    clearance = ball(chain, elbow, 0.05)
-    some = candidates(chain, takes, puts, clearance, near, 0.085)
-    assert 0 < len(some.pairs) < some.reached == every.reached and some.blocked is not None
-    assert clearance(some.pairs.reshape(-1, 6))[0].min() >= 0.0
+    for k in (0, 1):
+        clearance = ball(chain, chain.frames(every.pairs[0, k])[0][3], 0.05)
+        some = candidates(chain, takes, puts, clearance, near, 0.085)
+        assert 0 < len(some.pairs) < some.reached == every.reached and some.blocked is not None
+        visits = some.pairs.reshape(-1, 6)
+        above = straight_line(chain, visits, retreat(chain, visits), 0.085)[0][:, -1]
+        assert min(clearance(visits)[0].min(), clearance(above)[0].min()) >= 0.0
     none = candidates(chain, takes, puts, ball(chain, LEFT, 0.3), near, 0.085)
     assert len(none.pairs) == 0 and none.blocked is not None and none.blocked.depth > 0.0
     far = candidates(chain, poses(np.array([2.0, 0, 0]), 2), poses(RIGHT, 2), nothing, near, 0.1)
