@@ -61,7 +61,7 @@ class Leg:
         """α, β and γ of the arm alone, and what each kilogram of a part adds to them
         (SAMPLES, 2, 3, n)."""
         g, first, second = self.way.at(np.linspace(0.0, self.way.length, SAMPLES))
-        loaded = self.chain.carrying(1.0, self.center, np.zeros((3, 3)))
+        loaded = self.chain.with_payload(1.0, self.center, np.zeros((3, 3)))
         empty = np.stack(scalar_law(self.chain, g, first, second), axis=1)
         full = np.stack(scalar_law(loaded, g, first, second), axis=1)
         return np.stack([empty, full - empty], axis=1)

@@ -100,8 +100,8 @@ def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
         arm: [
             replace(
                 t,
-                goes=t.goes.stretched(length / t.goes.length),
-                brings=t.brings.stretched(length / t.brings.length),
+                goes=t.goes.stretch(length / t.goes.length),
+                brings=t.brings.stretch(length / t.brings.length),
             )
             for t in each
         ]

@@ -15,10 +15,10 @@ from factory.apps.arms.arrangement import CARRIER, Arrangement, feeder_name, pla
 from factory.apps.arms.body import standing
 from factory.apps.arms.cell import ToolGrip, down
 from factory.apps.arms.circuit import candidates, circuit
-from factory.apps.arms.inverse import away, straight
+from factory.apps.arms.inverse import retreat, straight_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
-from factory.apps.arms.reach import unreachable
+from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.scene import NEED, Scene
 
 YAWS = 8
@@ -144,7 +144,7 @@ class ArmPlanner:
     ) -> Diagnostic:
         position = self.cell.factory.by_label[label].position
         for place in places:
-            why = unreachable(self.chain, place, turn)
+            why = diagnose_reach(self.chain, place, turn)
             if why is not None:
                 return Diagnostic("Unreachable", why.message(label, self.name), position, RAILS)
         by = f": {self.scene.say(blocked.pair)} are in each other's way" if blocked else ""
@@ -168,7 +168,7 @@ class ArmPlanner:
 
     def _line(self, q: Array, length: float, label: str) -> Array:
         """Configurations along a straight line up from a visit (k, n)."""
-        rows, good = straight(self.chain, q[None], away(self.chain, q[None]), length)
+        rows, good = straight_line(self.chain, q[None], retreat(self.chain, q[None]), length)
         if not good[0]:
             message = f"{self.name} cannot go straight up from '{label}' by {length * 1e3:.0f} mm"
             position = self.cell.factory.by_label[label].position
