@@ -11,13 +11,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from factory.api import Diagnostic, Factory, InputError, Plan, Project
+from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
 from factory.apps.arms.body import STEM_MASS, mass_of
 from factory.apps.arms.read import read_chain
 from factory.theory.lang.template_reader import read_template
-from factory.theory.problem.pag import PAG, Assembly
 from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
-from factory.theory.problem.robot_types import Catalogue, RobotType
+from factory.theory.problem.robot_types import RobotType
 
 MODELS = Path(__file__).with_name("mjcf")
 """The files of the arms that are shipped."""

@@ -10,17 +10,16 @@ from math import asin, cos, pi, radians, sin
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Factory, Layout, RunError
+from factory.api import Array, Diagnostic, Factory, Guidepath, Layout, Product, RunError
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
 from factory.apps.arms.cell import GAP, PEDESTAL_HEIGHT, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.scene import StandingBox
-from factory.floor.geometry.solids import Product
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
 from factory.floor.geometry.suction import PadPlace, pad_place
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box, Guidepath
+from factory.floor.layout.guidepath import Box
 
 POINTING_DOWN = 0.72
 """How far from its axis a tool that points down comes, as a share of the chain's length."""

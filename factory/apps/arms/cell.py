@@ -15,10 +15,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Array, Factory, mujoco
+from factory.api import Array, Factory, Product, Solid, mujoco
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
-from factory.floor.geometry.solids import Product, Solid
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 

@@ -13,7 +13,16 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Diagnostic, Factory, Layout, RunError, mujoco
+from factory.api import (
+    Certificate,
+    Diagnostic,
+    Factory,
+    Guidepath,
+    Layout,
+    Operation,
+    RunError,
+    mujoco,
+)
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM
 from factory.apps.arms.cell import CellChains
@@ -26,17 +35,14 @@ from factory.floor.layout.certificate import (
     ARM_BODY,
     PAYLOAD_BODY,
     POST_BODY,
-    Certificate,
     Exclusions,
     Precedence,
     Region,
 )
 from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.dimensions import PAYLOADS
-from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
 REACH = 0.2

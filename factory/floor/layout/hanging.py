@@ -63,8 +63,8 @@ class Hanging:
             rises = bool(line) and line[0].feeder.rises
             common = pads.common(line) if line[1:] and not rises else {}
             for outlet in line:
-                own = pads.under if rises else pads.of
-                named, place = common.get(outlet.label) or (outlet.label, own(outlet))
+                place_of = pads.under if rises else pads.of
+                named, place = common.get(outlet.label) or (outlet.label, place_of(outlet))
                 slider[outlet.label] = named
                 places.setdefault(named, place)
         outlets = {outlet.label: outlet for outlet in outlets_of(layout)}

@@ -107,11 +107,11 @@ class Drives:
         if self._curves is None or not len(rows):
             return setpoints
         x, v, a = setpoints[which, :, 0].T, (setpoints[which, :, 1] + a[which] * lag).T, a[which].T
-        ways, now, own = self._curves.ways, self._curves.now[rows], self.own[axes[which]]
+        ways, now, empty = self._curves.ways, self._curves.now[rows], self.own[axes[which]]
         place, first, second = ways.at(now, x)
         speed = first * v[..., None]
         gain = first * a[..., None] + second * (v**2)[..., None]
-        force = ways.force(now, (x, v, a), own, self.mass[axes[which]] - own)
+        force = ways.force(now, (x, v, a), empty, self.mass[axes[which]] - empty)
         every = np.stack([place, speed - lag[:, None, None] * gain, force], axis=-1)
         every, setpoints = every.transpose(1, 2, 0, 3), setpoints.copy()
         setpoints[which] = every[:, 0]
