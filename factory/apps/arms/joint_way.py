@@ -16,6 +16,9 @@ import numpy as np
 from factory.api import Array, Index
 from factory.apps.arms.chain import JointLimits
 
+SETTLED = 1e-10
+"""A step of Newton's method that is shorter is the last [m]."""
+
 CLOSE = 0.02
 """The nearest coordinate is sought in steps no longer than this [m]."""
 
@@ -93,7 +96,8 @@ class JointWay:
     def _on(self, piece: Index, x: Array) -> tuple[Array, Array, Array]:
         """g, g' and g" of pieces at coordinates."""
         off = (x - self.knots[piece])[..., None]
-        g, first, second, third = np.moveaxis(self.terms[piece], -2, 0)
+        terms = self.terms[piece]
+        g, first, second, third = (terms[..., k, :] for k in range(4))
         bend = second + off * third
         slope = first + off * (second + bend) / 2
         return g + off * (first + off * (second / 2 + off * third / 6)), slope, bend
@@ -146,7 +150,7 @@ class JointWay:
         Args:
             places: configurations (m, n) [rad, m].
             near: coordinates close to those sought (m,) [m].
-            rounds: number of steps.
+            rounds: greatest number of steps.
         """
         x = np.clip(near, 0.0, self.length)
         for _ in range(rounds):
@@ -154,7 +158,9 @@ class JointWay:
             apart, square = g - places, (first * first).sum(axis=-1)
             bowl = square + (apart * second).sum(axis=-1)
             step = (apart * first).sum(axis=-1) / np.where(bowl > square / 4, bowl, square + 1e-300)
-            x = np.clip(x - np.clip(step, -CLOSE, CLOSE), 0.0, self.length)
+            x, before = np.clip(x - np.clip(step, -CLOSE, CLOSE), 0.0, self.length), x
+            if np.abs(x - before).max(initial=0.0) < SETTLED:
+                break
         return x, np.linalg.norm(self.at(x)[0] - places, axis=-1)
 
     def along(self, places: Array, velocities: Array, near: Array) -> tuple[Array, Array]:
