@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Geoms, Replica
-from factory.engine.mjcf.weld_frames import WeldFrames
+from factory.engine.mjcf.weld_frames import WeldFrames, joints_of
 from factory.floor.geometry.sight import View
 from factory.floor.geometry.solids import rotation
 from factory.support.arrays import Array
@@ -98,6 +98,9 @@ def outlines(view: View, boxes: Array) -> tuple[Array, Array]:
     points = shapely.multipoints(shapely.points(seen[:, :, :2] / ahead[:, :, None]))
     return shapely.convex_hull(points), seen[:, :, 2]
 
+
+ELBOW = 2
+"""Joints of a chain below its elbow."""
 
 SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
@@ -222,12 +225,17 @@ def _shed(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[Array]:
 
 
 def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
-    """Points around each geom of the moving bodies."""
-    roots = m.body_rootid[m.geom_bodyid]
-    slides = m.jnt_bodyid[m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE]
+    """Points around each geom of the moving bodies; of a chain of hinges up to its elbow, which
+    stands out from its base."""
+    roots, joints = m.body_rootid[m.geom_bodyid], m.jnt_type
+    slides = m.jnt_bodyid[joints == mujoco.mjtJoint.mjJNT_SLIDE]
     moving = [b for b in m.body_rootid[slides] if names.kind(m.body(int(b)).name) != "feeder"]
-    for g in np.flatnonzero(np.isin(roots, moving)).tolist():
-        yield (int(roots[g]), "body"), placed(m, d, g)
+    hinges = m.jnt_bodyid[joints == mujoco.mjtJoint.mjJNT_HINGE]
+    chains = np.setdiff1d(m.body_rootid[hinges], m.body_rootid[slides])
+    for g in np.flatnonzero(np.isin(roots, [*moving, *chains])).tolist():
+        root, body = int(roots[g]), int(m.geom_bodyid[g])
+        if root not in chains or len(joints_of(m, body)) <= ELBOW:
+            yield (root, "body"), placed(m, d, g)
 
 
 def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
