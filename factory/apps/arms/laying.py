@@ -28,9 +28,9 @@ from factory.apps.arms.body import STEM
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
-from factory.apps.arms.planning import ArmPlanner, ArmTour
+from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
 from factory.apps.arms.read import read_chain
-from factory.apps.arms.sharing import SweptArm, clear_from
+from factory.apps.arms.sharing import clear_from
 from factory.floor.layout.certificate import (
     ARM_BODY,
     PAYLOAD_BODY,
@@ -212,9 +212,11 @@ def _orders(
         if one == other:
             continue
         goes, then = _next(tours[one], left.label).goes, _next(tours[other], comes.label).goes
-        scene = planners[other].scene
-        others = SweptArm.of(scene, comes.brings, comes.label), SweptArm.of(scene, then)
-        share = clear_from(SweptArm.of(planners[one].scene, goes), others)
+        others = (
+            planners[other].swept(comes.brings, comes.label),
+            planners[other].swept(then),
+        )
+        share = clear_from(planners[one].swept(goes), others)
         if share is None:
             names = (factory.robots[arm].name for arm in (one, other))
             message = f"{' and '.join(names)} are in each other's way at their feeders"
@@ -267,6 +269,7 @@ def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certif
     assert rails is not None
     return replace(
         rails,
+        clearance=CERTAIN,
         robots=tuple(robot.name for robot in cell.factory.robots),
         operations=tuple(operation.label for operation in cell.factory.operations),
         regions=tuple(_regions(cell, layout)),

@@ -3,7 +3,9 @@ and places them, and its ways between these."""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 from pathlib import Path
 
@@ -12,20 +14,26 @@ import numpy as np
 from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import CARRIER, Arrangement, feeder_name, placed_name
-from factory.apps.arms.body import standing
+from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, down
+from factory.apps.arms.certifying import uncertified
+from factory.apps.arms.chain import ConvexBody
 from factory.apps.arms.circuit import candidates, circuit
 from factory.apps.arms.inverse import retreat, straight_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
 from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.scene import NEED, Scene
+from factory.apps.arms.sharing import SweptArm
 
 YAWS = 8
 """Number of angles at which a part may be held."""
 
 AT_END = 0.001
-"""Clearance of an arm's links on its straight ends [m]."""
+"""Clearance of an arm's links on its straight ends, at samples [m]."""
+
+CERTAIN, CERTAIN_AT_END = 0.004, 2e-4
+"""Clearance that is certified on transfers, and on straight ends [m]."""
 
 VISITED = 0.002
 """Clearance that is asked of configurations in which parts are taken and placed [m]."""
@@ -176,23 +184,68 @@ class ArmPlanner:
         return np.asarray(rows[0])
 
     def _leg(self, out: Array, into: Array, label: str, before: str, after: str) -> JointWay:
-        every = self._later("")
-        spared = {f"'{label}'", *every}
-        ends = {f"'{label}'", CARRIER, f"'{after}'", feeder_name(after), *self._later(before)}
+        """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
+        scene, every = self.scene, self._later("")
+        well = {f"'{after}'", feeder_name(after), *every}
+        pile = {CARRIER, f"'{label}'", *self._later(before)}
+        first, last = (well, pile) if label else (pile, well)
         way = leg(
             self.chain,
             out,
             into,
-            lambda q: self.scene.margins(q, label, NEED, spared),
-            lambda q: self.scene.margins(q, label, AT_END, ends, held=False),
+            lambda q: scene.margins(q, label, NEED, {f"'{label}'", *every}),
+            lambda q: scene.margins(q, label, AT_END, {*first, *last}, held=False),
             self.pace,
         )
-        if isinstance(way, NoWay):
-            message = (
-                f"{self.name} finds no way from '{before}' to '{after}':"
-                f" {self.scene.say(way.pair)} come {way.depth * 1e3:.1f} mm nearer to each"
-                " other than they may"
+        blocked = way if isinstance(way, NoWay) else None
+        if isinstance(way, JointWay):
+            certified = (
+                ((0.0, way.off), first, CERTAIN_AT_END, bool(label)),
+                ((way.off, way.hover), {f"'{label}'", *every}, CERTAIN, True),
+                ((way.hover, way.length), last, CERTAIN_AT_END, False),
             )
-            position = self.cell.factory.by_label[after].position
-            raise RunError(Diagnostic("NoWay", message, position, RAILS))
-        return way
+            bodies = [*self.chain.bodies, *self._carried(label)]
+            faults = (
+                uncertified(
+                    self.chain,
+                    way,
+                    stretch,
+                    bodies,
+                    partial(self._margins, label, need, spared, held),
+                )
+                for stretch, spared, need, held in certified
+            )
+            blocked = next(filter(None, faults), None)
+            if blocked is None:
+                return way
+        assert blocked is not None
+        message = (
+            f"{self.name} finds no way from '{before}' to '{after}':"
+            f" {scene.say(blocked.pair)} come {blocked.depth * 1e3:.1f} mm nearer to each other"
+            " than they may"
+        )
+        position = self.cell.factory.by_label[after].position
+        raise RunError(Diagnostic("NoWay", message, position, RAILS))
+
+    def swept(self, way: JointWay, label: str = "") -> SweptArm:
+        """What the arm sweeps on a way, with a part that it holds."""
+        return SweptArm.of(self.scene, self.chain, way, [*self._carried(label)], label)
+
+    def _margins(
+        self, label: str, need: float, spared: Collection[str], held: bool, q: Array
+    ) -> tuple[Array, Index]:
+        return self.scene.margins(q, label, need, spared, held)
+
+    def _carried(self, label: str) -> Iterator[ConvexBody]:
+        """What moves with the last frame of the chain besides its links: the tool, and a part, of
+        which it is not asked how it is held."""
+        chain, pad = self.chain, self.cell.pad
+        stem = [chain.tool_place - chain.tool_turn @ [0.0, 0.0, STEM], chain.tool_place]
+        yield ConvexBody("tool", len(chain), np.array(stem), pad)
+        if label:
+            solid = self.cell.product.solids[label]
+            middle = (solid.low + solid.high) / 2 - self.cell.tip[label]
+            aside, below = float(np.hypot(*middle[:2])), -float(middle[2])
+            half = float(np.linalg.norm(solid.high - solid.low)) / 2
+            at = chain.tool_place + chain.tool_turn @ [0.0, 0.0, below]
+            yield ConvexBody(label, len(chain), at[None], half + aside)

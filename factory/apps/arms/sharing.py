@@ -11,15 +11,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.api import Array, mujoco
+from factory.apps.arms.chain import ConvexBody, SerialChain
+from factory.apps.arms.growth import travels
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.scene import Scene
 
-SAMPLES = 64
+SAMPLES = 96
 """Number of places on a way."""
 
-BETWEEN = 0.03
-"""Distance of two arms at the samples [m]: what they go between two of them is less than a third
-of it."""
+BETWEEN = 0.01
+"""Least distance of two arms that may move without waiting for each other [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +30,23 @@ class SweptArm:
     Attributes:
         ends: of their axes (SAMPLES, k, 2, 3) [m].
         radius: (k,) [m].
+        between: the most that a point of them moves from one sample to the next [m].
     """
 
     ends: Array
     radius: Array
+    between: float
 
     @classmethod
-    def of(cls, scene: Scene, way: JointWay, label: str = "") -> SweptArm:
-        """Those of an arm on a way, with a part that it holds."""
+    def of(
+        cls,
+        scene: Scene,
+        chain: SerialChain,
+        way: JointWay,
+        carried: Sequence[ConvexBody],
+        label: str = "",
+    ) -> SweptArm:
+        """Those of an arm on a way, with what it carries at its tool, a part perhaps."""
         m, d = scene.m, scene.d
         geoms = [*scene.links, *scene.loads.get(label, ())]
         balls = np.isin(geoms, [*scene.loads.get(label, ())])
@@ -44,13 +54,15 @@ class SweptArm:
         long = np.where(round_, 0.0, m.geom_size[geoms, 1])
         radius = np.where(balls, m.geom_rbound[geoms], m.geom_size[geoms, 0])
         rows = []
-        for q in way.at(np.linspace(0.0, way.length, SAMPLES))[0]:
+        x = np.linspace(0.0, way.length, SAMPLES)
+        gone = float(travels(chain, way, x, [*chain.bodies, *carried]).max())
+        for q in way.at(x)[0]:
             d.qpos[:] = q
             mujoco.mj_kinematics(m, d)
             axis = d.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2] * long[:, None]
             middle = d.geom_xpos[geoms]
             rows.append(np.stack([middle - axis, middle + axis], axis=1))
-        return cls(np.array(rows), radius)
+        return cls(np.array(rows), radius, gone)
 
 
 BALL = int(mujoco.mjtGeom.mjGEOM_SPHERE)
@@ -73,14 +85,15 @@ def _nearer(one: SweptArm, row: int, other: SweptArm) -> bool:
     """Whether an arm at a sample comes nearer to another than it may, wherever that is."""
     a, b = one.ends[row], other.ends.reshape(-1, 2, 3)
     radius = np.tile(other.radius, SAMPLES)
+    least = BETWEEN + (one.between + other.between) / 2
     middle = b.mean(axis=1)
     reach = np.linalg.norm(b[:, 1] - b[:, 0], axis=1) / 2 + radius
     for ends, r in zip(a, one.radius, strict=True):
         far = np.linalg.norm(middle - ends.mean(axis=0), axis=1) - reach
-        close = far - np.linalg.norm(ends[1] - ends[0]) / 2 - r < BETWEEN
+        close = far - np.linalg.norm(ends[1] - ends[0]) / 2 - r < least
         if close.any():
             gap = _distances(ends, b[close]) - radius[close] - r
-            if (gap < BETWEEN).any():
+            if (gap < least).any():
                 return True
     return False
 
