@@ -221,7 +221,9 @@ RELAY = options(
         help="Number of branches that make a label in turn, for example sub2=3 (repeatable).",
     ),
     click.option(
-        "--arm", metavar="NAME", help="Let an articulated arm place the parts: six, scara."
+        "--arm",
+        metavar="NAME",
+        help="Let an arm place the parts: six, scara or an MJCF file; six=2 for two arms.",
     ),
     click.option("--order", metavar="PRODUCT,...", help="Sequence of a mix: truck,truck,van."),
     click.option(

@@ -9,17 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
 from factory.apps.arms.body import STEM_MASS, mass_of
-from factory.apps.arms.read import read_chain
+from factory.apps.arms.model import ArmModel
 from factory.theory.lang.template_reader import read_template
 from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
 from factory.theory.problem.robot_types import RobotType
-
-MODELS = Path(__file__).with_name("mjcf")
-"""The files of the arms that are shipped."""
 
 RAILS = "leave out --arm: rails make it"
 
@@ -36,24 +32,21 @@ place = (R, j, ~, <a; b>, F) where
 """The operation in which an arm of a kind lowers what it has fetched onto what a carrier brings."""
 
 
-def robot_type(kind: str, file: Path) -> RobotType:
-    """The robot type of an arm: a dot whose axis moves all joints of its chain. Raises InputError
-    (BadArm)."""
-    chain, moved = read_chain(file), 0.0
-    moves = tuple((joint, joint) for joint in chain.joints)
-    moved = float(chain.inertia.mass.sum()) + STEM_MASS
-    axis = RobotAxis(WAY, moved, moves=moves)
-    return RobotType(kind, file, RobotBody(CARRIAGE, mass_of(file), (axis,)), "dot")
+def robot_type(model: ArmModel) -> RobotType:
+    """The robot type of an arm: a dot whose axis moves all joints of its chain."""
+    moves = tuple((joint, joint) for joint in model.chain.joints)
+    axis = RobotAxis(WAY, float(model.chain.inertia.mass.sum()) + STEM_MASS, moves=moves)
+    return RobotType(model.kind, model.file, RobotBody(CARRIAGE, mass_of(model), (axis,)), "dot")
 
 
-def armed(project: Project, kind: str, arms: int = 1) -> Project:
+def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
     """The project in which some arms of a kind place all parts but the first, by turns. Raises
     InputError (NoCell) where two sub-assemblies are joined."""
     if project.pag.mix is not None:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
-    catalogue, pag = project.catalogue, _placing(project.pag)
-    types = {**catalogue.types, kind: robot_type(kind, MODELS / f"{kind}.xml")}
+    kind, catalogue, pag = model.kind, project.catalogue, _placing(project.pag)
+    types = {**catalogue.types, kind: robot_type(model)}
     templates = {**project.templates, "place": read_template(PLACE.format(kind=kind), f"{kind}.op")}
     lowered = {node.label: node.inputs[-1] for node in pag.nodes if len(node.inputs) > 1}
     made = replace(

@@ -6,14 +6,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import asin, cos, pi, radians, sin
+from math import asin, cos, pi, sin
 
 import numpy as np
 
 from factory.api import Array, Diagnostic, Factory, Guidepath, Layout, Product, RunError
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
-from factory.apps.arms.cell import GAP, PEDESTAL_HEIGHT, Well, down, shown_height, well_of
+from factory.apps.arms.cell import GAP, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.reach import Ring, ring_of
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
 from factory.floor.geometry.suction import PadPlace, pad_place
@@ -21,15 +22,8 @@ from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.guidepath import Box
 
-POINTING_DOWN = 0.72
-"""How far from its axis a tool that points down comes, as a share of the chain's length."""
-
-NEAR, ROUND = 0.5, 0.52
-"""Shares of that: the distance of an arm from the station, and that of its feeders."""
-
-PRIVATE = radians(72.0)
-"""Least angle between the station and a feeder, as an arm sees them, where there is another arm:
-ways nearer to the station are near those of the other for all of their length [rad]."""
+CLOSER = 0.02
+"""How much farther from an arm than the station its feeders are [m]."""
 
 APART = 0.02
 """Between what stands beside each other [m]."""
@@ -55,11 +49,15 @@ class Arrangement:
         factory: the factory; its first robot is the carrier, all others are arms.
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
+        private: least angle between the station and a feeder, as its arm sees them: with another
+            arm, ways nearer to the station are near those of the other for all of their length
+            [rad].
     """
 
     factory: Factory
     rails: Layout
     chain: SerialChain
+    private: float = 0.0
 
     @property
     def product(self) -> Product:
@@ -102,9 +100,29 @@ class Arrangement:
         return self.line.middle(self.line.reach + self.lane)
 
     @cached_property
-    def far(self) -> float:
-        """How far an arm's tool comes from its axis, pointing down [m]."""
-        return self.chain.length * POINTING_DOWN
+    def show(self) -> float:
+        """Height at which the bottoms of parts are shown [m]."""
+        solids = [self.product.solids[label] for label in self.arm_of]
+        return shown_height(solids, self.rails.clearance)
+
+    @cached_property
+    def ring(self) -> Ring:
+        """Where the arms stand, and between which distances from their axes they take and place.
+        Raises RunError (Unreachable) where their tools do not come up and down far enough."""
+        tips, low = list[float](), float(self.product.low[2])
+        for label, tip in self.tip.items():
+            shown = self.show + float(tip[2] - self.product.solids[label].low[2])
+            placed = PAYLOAD + float(tip[2]) - low
+            tips += [shown, placed, shown + self.over_well, placed + self.rises(label)]
+            tips.append(placed + self.leaves(label))
+        ring = ring_of(self.chain, min(tips), max(tips))
+        if ring is None:
+            message = (
+                f"the arm does not come from {1e3 * min(tips):.0f} to {1e3 * max(tips):.0f} mm up"
+                " with its tool down, as these parts need"
+            )
+            raise RunError(Diagnostic("Unreachable", message, None, "flatter parts, another arm"))
+        return ring
 
     @cached_property
     def stands(self) -> dict[int, Stand]:
@@ -112,19 +130,18 @@ class Arrangement:
         if len(self.arms) > len(SIDES):
             message = f"{len(self.arms)} arms have no room at one station"
             raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
-        (x, y), off = self.station, NEAR * self.far
+        (x, y), off = self.station, self.ring.near
         return {
-            arm: Stand((x, y + side * off, PEDESTAL_HEIGHT), -side * pi / 2, self.pad)
+            arm: Stand((x, y + side * off, self.ring.base), -side * pi / 2, self.pad)
             for arm, side in zip(self.arms, SIDES, strict=False)
         }
 
     @cached_property
     def wells(self) -> dict[str, Well]:
         """The feeders of all arms."""
-        solids = [self.product.solids[label] for label in self.arm_of]
-        show = shown_height(solids, self.rails.clearance)
+        room = self.product, self.show, self.rails.clearance
         return {
-            label: well_of(self.product, self.product.solids[label], at, show, self.rails.clearance)
+            label: well_of(self.product.solids[label], at, *room)
             for arm in self.arms
             for label, at in self._places(arm)
         }
@@ -132,16 +149,16 @@ class Arrangement:
     def _places(self, arm: int) -> Iterator[tuple[str, tuple[float, float]]]:
         """Where the parts of an arm are shown: on a circle round it, to the right and left of the
         station in turn, the first ones next to the carrier's line."""
-        stand, radius = self.stands[arm], ROUND * self.far
+        stand, radius = self.stands[arm], self.ring.near + CLOSER
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.rails.clearance
         angles = [0.0, 0.0]
         for number, label in enumerate(self.labels(arm)):
             solid = self.product.solids[label]
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
-            room = (NEAR * self.far - beside - wide) / radius
+            room = (self.ring.near - beside - wide) / radius
             first = pi / 2 - asin(max(-1.0, min(1.0, room)))
-            first = max(first, PRIVATE * (len(self.arms) > 1))
+            first = max(first, self.private)
             side = number % 2
             angle = max(angles[side] + pitch, first)
             angles[side] = angle + pitch
@@ -208,14 +225,13 @@ class Arrangement:
 
     def leaves(self, label: str) -> float:
         """How far the empty tool goes straight up from where it has placed a part [m]."""
-        return (self.top + ABOVE - float(self.tip[label][2] + self.placed[2])) / STRAIGHT
+        tip = PAYLOAD + float(self.tip[label][2] - self.product.low[2])
+        return (self.top + ABOVE - tip) / STRAIGHT
 
     @cached_property
     def over_well(self) -> float:
         """How far the tool goes straight up from a feeder [m]."""
-        solids = self.product.solids
-        show = min(float(solids[label].low[2] + self.shown(label)[2]) for label in self.arm_of)
-        return max(OVER_WELL, self.top + 2 * ABOVE - show)
+        return max(OVER_WELL, self.top + 2 * ABOVE - self.show)
 
     def loads(self, label: str) -> list[tuple[Array, Array, Array]]:
         """The boxes of a part in the tool's frame, held with the tool's angle at 0: place, half

@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from math import cos, sin
-from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from factory.api import mujoco
+from factory.apps.arms.model import ArmModel
 
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""
@@ -42,30 +40,74 @@ class Stand:
     pad: float
 
 
-def standing(file: Path, stand: Stand, site: str = "tool") -> Element:
-    """The MJCF of an arm's file, with the arm on its stand: its outermost body is `carriage`, and
-    `tool` is the frame of the tip of its tool, z out of it."""
-    root = ElementTree.parse(file).getroot()
-    body = root.findall("worldbody/body")[0]
-    body.set("name", "carriage")
-    body.set("pos", " ".join(f"{v:.9g}" for v in stand.place))
-    body.set("quat", f"{cos(stand.yaw / 2):.12g} 0 0 {sin(stand.yaw / 2):.12g}")
-    body.insert(0, _cylinder("pedestal", PEDESTAL, -stand.place[2], 0.0, PEDESTAL_MASS, GRAPHITE))
+RESERVED = ("carriage", "tool", "stem", "pad", "pedestal")
+"""Names of what is added to an arm."""
+
+
+def standing(model: ArmModel, stand: Stand, site: str = "tool") -> Element:
+    """The MJCF of an arm on its stand: its outermost body is `carriage`, and `tool` is the frame of
+    its site, z out of it, with a tool as long as STEM."""
+    root = model.root()
+    world = root.find("worldbody")
+    assert world is not None
+    body = next(b for b in world.findall("body") for s in b.iter("site") if s.get("name") == site)
     holder = next(b for b in body.iter("body") for s in b.findall("site") if s.get("name") == site)
     mount = next(s for s in holder.findall("site") if s.get("name") == site)
+    contact = _own_contact(root, body.get("name", ""))
+    for node in body.iter():
+        if node.get("name") in RESERVED and node is not mount:
+            node.set("name", f"own_{node.get('name')}")
+    for inner in body.iter("body"):
+        for number, geom in enumerate(inner.findall("geom")):
+            if "name" not in geom.attrib:
+                geom.set("name", f"{inner.get('name', 'link')}_{number}")
+    for inner in [*body.iter()]:
+        for light in [*inner.findall("light"), *inner.findall("camera")]:
+            inner.remove(light)
+    for other in [*world]:
+        world.remove(other)
+    base = body if body.find("joint") is None else Element("body")
+    if base is not body:
+        base.append(body)
+    world.append(base)
+    for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
+        base.attrib.pop(key, None)
+    base.set("name", "carriage")
+    base.set("pos", " ".join(f"{v:.9g}" for v in stand.place))
+    base.set("quat", f"{cos(stand.yaw / 2):.12g} 0 0 {sin(stand.yaw / 2):.12g}")
+    base.insert(0, _cylinder("pedestal", PEDESTAL, -stand.place[2], 0.0, PEDESTAL_MASS, GRAPHITE))
     tool = SubElement(holder, "body", {"name": "tool"})
     for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
         if key in mount.attrib:
             tool.set(key, mount.attrib[key])
     tool.append(_cylinder("stem", SLIM * stand.pad, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1"))
     tool.append(_cylinder("pad", stand.pad, STEM - PAD, STEM, 0.0, GRAPHITE))
+    first = next(inner for inner in base.iter("body") if inner.find("joint") is not None)
+    if "name" not in first.attrib:
+        first.set("name", "first_link")
+    SubElement(contact, "exclude", {"body1": "carriage", "body2": first.get("name", "")})
+    for name in ("keyframe", "sensor", "contact", "tendon", "equality"):
+        for section in root.findall(name):
+            root.remove(section)
+    root.append(contact)
     return root
 
 
-def mass_of(file: Path) -> float:
+def _own_contact(root: Element, base: str) -> Element:
+    """The pairs of an arm's bodies that its file leaves out of contact, by the names that they have
+    on a stand."""
+    contact = Element("contact")
+    for pair in root.findall("contact/exclude"):
+        bodies = (pair.get("body1", ""), pair.get("body2", ""))
+        names = ["own_" * (name in RESERVED) + name for name in bodies]
+        names = ["carriage" if name == base else name for name in names]
+        SubElement(contact, "exclude", {"body1": names[0], "body2": names[1]})
+    return contact
+
+
+def mass_of(model: ArmModel) -> float:
     """What an arm weighs with its pedestal and its tool [kg]."""
-    root = standing(file, Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS))
-    m = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+    m = model.compiled(standing(model, Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS)))
     return float(m.body_subtreemass[m.body("carriage").id])
 
 
@@ -93,9 +135,13 @@ def add(root: Element, robot: str, kind: str, section: Mapping[str, Element]) ->
     for node in body.iter():
         if "name" in node.attrib:
             node.set("name", f"{robot}/{node.get('name')}")
+    body.set("childclass", body.get("childclass", kind))
     moved = next(inner for inner in body.iter("body") if inner.find("joint") is not None)
     moved.set("sleep", "allowed")
     section["worldbody"].append(body)
+    for number, pair in enumerate(root.findall("contact/exclude")):
+        bodies = {key: f"{robot}/{pair.get(key)}" for key in ("body1", "body2")}
+        SubElement(section["contact"], "exclude", {"name": f"{robot}/{number}", **bodies})
     there = {d.get("class") for d in section["default"].findall("default")}
     if kind in there:
         return

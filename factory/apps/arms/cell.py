@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, hypot, sin
-from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -18,6 +17,7 @@ import numpy as np
 from factory.api import Array, Factory, Product, Solid, mujoco
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
+from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 
@@ -29,9 +29,6 @@ FLOOR = 0.02
 
 BELOW = 0.005
 """Between the lowest place of a feeder's pad and the bottom of its well [m]."""
-
-PEDESTAL_HEIGHT = 0.10
-"""Height of an arm's base [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +77,7 @@ class CellChains:
     Attributes:
         factory: the factory.
         robots: the arms (index).
-        file: MJCF of the arms.
+        model: the kind of the arms.
         stands: where each stands.
         wells: the feeder of each label.
         grips: of each label.
@@ -94,7 +91,7 @@ class CellChains:
     factory: Factory
     product: Product
     robots: tuple[int, ...]
-    file: Path
+    model: ArmModel
     stands: Mapping[int, Stand]
     wells: Mapping[str, Well]
     grips: Mapping[str, ToolGrip]
@@ -102,8 +99,12 @@ class CellChains:
     rows: Mapping[tuple[int, int], int]
     standoffs: Mapping[int, float]
     clear: Mapping[int, float]
-    gains: Sequence[tuple[float, float, float]]
     timestep: float = 0.002
+
+    @property
+    def files(self) -> Mapping[str, bytes]:
+        """The meshes of the arms by name."""
+        return self.model.files
 
     @property
     def length(self) -> float:
@@ -141,22 +142,22 @@ class CellChains:
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]
-        root = standing(self.file, self.stands[robot])
+        root = standing(self.model, self.stands[robot])
         add(root, of.name, of.type, section)
 
     def drives(self, robot: int) -> Sequence[tuple[float, float, float]]:
-        return self.gains
+        return self.model.gains
 
 
 def well_of(
-    product: Product, solid: Solid, place: tuple[float, float], show: float, clearance: float
+    solid: Solid, place: tuple[float, float], product: Product, show: float, clearance: float
 ) -> Well:
     """The feeder of a part that is shown with its bottom at a height.
 
     Args:
-        product: the product.
         solid: the part.
         place: of the part's middle in the world (x, y) [m].
+        product: the product.
         show: height of its bottom [m].
         clearance: between the part and the rim, and the rim and others [m].
     """

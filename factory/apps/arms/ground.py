@@ -7,12 +7,10 @@ from functools import cached_property
 from typing import Any
 
 from factory.api import Factory, Layout, Product, Project, Settings, usage_error
-from factory.apps.arms.arming import MODELS, armed
+from factory.apps.arms.arming import armed
 from factory.apps.arms.joint_way import WayLimits
+from factory.apps.arms.model import ArmModel
 from factory.floor.layout.request import Ground
-
-KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
-"""The arms that are shipped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,24 +18,24 @@ class CellGround(Ground):
     """The floor of a cell.
 
     Attributes:
-        kind: the arm.
+        model: the kind of its arms.
         rails: the project of the same product on rails, from which the carrier's line is taken.
     """
 
-    kind: str = ""
+    model: ArmModel | None = field(default=None, compare=False, repr=False)
     rails: Project | None = field(default=None, compare=False, repr=False)
 
     def lay_out(self, factory: Factory, product: Product, settings: Settings, *_: Any) -> Layout:
         """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
-        from factory.apps.arms.laying import Arm, laid_out
+        from factory.apps.arms.laying import laid_out
         from factory.floor.geometry.fused_bodies import repeated
         from factory.floor.mating.mating import judged
 
-        assert self.rails is not None
+        assert self.rails is not None and self.model is not None
         factory, product = judged(factory, product), repeated(product, factory)
         rails = self.rails.with_settings(settings).layout
         pace = WayLimits(settings.speed, settings.acceleration)
-        return laid_out(factory, rails, Arm.of(MODELS / f"{self.kind}.xml"), pace)
+        return laid_out(factory, rails, self.model, pace)
 
 
 class CellProject(Project):
@@ -60,21 +58,20 @@ def with_arm(project: Project, asked: str) -> Project:
 
     Args:
         project: of the product.
-        asked: the kind of arm, or `KIND=NUMBER` for several.
+        asked: the kind of arm, or the path of its MJCF; with `=2` for two of them.
 
-    Raises InputError: Usage for an unknown kind, NoCell for what a cell cannot make.
+    Raises InputError: Usage for an unknown kind, BadArm, NoCell for what a cell cannot make.
     """
-    kind, _, number = asked.partition("=")
-    if kind not in KINDS:
-        raise usage_error(f"there is no arm '{kind}'", f"arms: {', '.join(KINDS)}")
+    name, _, number = asked.partition("=")
     if number not in ("", "1", "2"):
-        raise usage_error(f"--arm {asked}: a cell has one arm or two", f"--arm {kind}=2")
-    made = armed(project, kind, int(number or 1))
+        raise usage_error(f"--arm {asked}: a cell has one arm or two", f"--arm {name}=2")
+    model = ArmModel.of(name)
+    made = armed(project, model, int(number or 1))
     nodes = tuple(
         replace(node, operation="insert") if len(node.inputs) > 1 else node
         for node in made.pag.nodes
     )
     rails = project.with_pag(replace(project.pag, nodes=nodes))
     values = {name: getattr(made, name) for name in made.__dataclass_fields__}
-    ground = CellGround(project.ground.floor, kind=kind, rails=rails)
+    ground = CellGround(project.ground.floor, model=model, rails=rails)
     return CellProject(**{**values, "ground": ground})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from math import radians
 
 import numpy as np
 
@@ -21,15 +21,14 @@ from factory.api import (
     Layout,
     Operation,
     RunError,
-    mujoco,
 )
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
+from factory.apps.arms.model import ArmModel
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
-from factory.apps.arms.read import read_chain
 from factory.apps.arms.sharing import clear_from
 from factory.floor.layout.certificate import (
     ARM_BODY,
@@ -45,6 +44,9 @@ from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
+PRIVATE = tuple(map(radians, (72.0, 84.0, 96.0)))
+"""Angles that are tried as `Arrangement.private` where there are several arms [rad]."""
+
 REACH = 0.2
 """The coordinate of an arm's axis where it places [m]."""
 
@@ -52,30 +54,7 @@ BEYOND = 0.001
 """How much further than it must an arm has gone where it counts as away [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class Arm:
-    """A kind of arm.
-
-    Attributes:
-        file: its MJCF.
-        gains: of its drives: kp, kv, greatest torque [N m/rad, N m s/rad, N m].
-    """
-
-    file: Path
-    gains: tuple[tuple[float, float, float], ...]
-
-    @classmethod
-    def of(cls, file: Path) -> Arm:
-        """That of a file, with the gains of its actuators."""
-        m = mujoco.MjModel.from_xml_path(str(file))
-        rows = [
-            (-float(m.actuator_biasprm[a, 1]), -float(m.actuator_biasprm[a, 2]), float(top))
-            for a, top in enumerate(m.actuator_forcerange[:, 1])
-        ]
-        return cls(file, tuple(rows))
-
-
-def laid_out(factory: Factory, rails: Layout, arm: Arm, pace: WayLimits) -> Layout:
+def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) -> Layout:
     """The layout of a cell with its certificate.
 
     Args:
@@ -86,16 +65,31 @@ def laid_out(factory: Factory, rails: Layout, arm: Arm, pace: WayLimits) -> Layo
 
     Raises RunError: Unreachable, NoWay, Layout.
     """
-    chain = read_chain(arm.file)
-    tip = chain.tool_place + chain.tool_turn @ [0.0, 0.0, STEM]
-    cell = Arrangement(factory, rails, replace(chain, tool_place=tip))
+    tip = arm.chain.tool_place + arm.chain.tool_turn @ [0.0, 0.0, STEM]
+    chain, several = replace(arm.chain, tool_place=tip), len(factory.robots) > 2
+    for private in PRIVATE if several else (0.0,):
+        cell = Arrangement(factory, rails, chain, private)
+        layout, in_the_way = _with_legs(cell, arm, pace)
+        if not in_the_way:
+            return layout
+    message = f"{in_the_way} are in each other's way at their feeders"
+    raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
+
+
+def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> tuple[Layout, str]:
+    """The layout of a cell, and the names of two arms of which one is in the other's way at its
+    feeder, "" for none."""
     bare = _layout(cell, 1.0)
-    planners = {n: ArmPlanner(cell, n, arm.file, bare, pace) for n in cell.arms}
+    planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})
     chains = _chains(cell, arm, planners, tours)
     layout = _layout(cell, chains.length, chains)
-    apart = _exclusions(layout, [*_orders(cell, planners, tours)], tours)
-    return replace(layout, certificate=_certificate(cell, layout, apart))
+    asked = [*_orders(cell, planners, tours)]
+    for one in asked:
+        if isinstance(one, str):
+            return layout, one
+    apart = _exclusions(layout, [one for one in asked if isinstance(one, Away)], tours)
+    return replace(layout, certificate=_certificate(cell, layout, apart)), ""
 
 
 def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
@@ -117,7 +111,7 @@ def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
 
 def _chains(
     cell: Arrangement,
-    arm: Arm,
+    arm: ArmModel,
     planners: Mapping[int, ArmPlanner],
     tours: Mapping[int, Sequence[ArmTour]],
 ) -> CellChains:
@@ -139,7 +133,7 @@ def _chains(
         factory,
         cell.product,
         tuple(cell.arms),
-        arm.file,
+        arm,
         cell.stands,
         cell.wells,
         {t.label: t.grip for each in tours.values() for t in each},
@@ -147,7 +141,6 @@ def _chains(
         rows,
         standoffs,
         clear,
-        arm.gains,
     )
 
 
@@ -193,9 +186,9 @@ class Away:
 
 def _orders(
     cell: Arrangement, planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
-) -> Iterator[Away]:
-    """What keeps arms apart at the station, and from the carrier that leaves it. Raises RunError
-    (Layout) where an arm at its feeder is in the way of another."""
+) -> Iterator[Away | str]:
+    """What keeps arms apart at the station, and from the carrier that leaves it; the names of two
+    arms of which one is in the other's way at its feeder."""
     factory = cell.factory
     of = {t.label: (arm, t) for arm, each in tours.items() for t in each}
     joins = sorted(
@@ -218,9 +211,8 @@ def _orders(
         )
         share = clear_from(planners[one].swept(goes), others)
         if share is None:
-            names = (factory.robots[arm].name for arm in (one, other))
-            message = f"{' and '.join(names)} are in each other's way at their feeders"
-            raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
+            yield " and ".join(factory.robots[arm].name for arm in (one, other))
+            return
         yield Away(gone(before, share * goes.length), after.index, int(after is joins[0]))
     arm, tour = of[_brought(cell, joins[-1])]
     off = _next(tours[arm], tour.label).goes.off
@@ -285,9 +277,9 @@ def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
         box = one.low[0], one.high[0], one.low[1], one.high[1]
         yield Region(0, PAYLOADS, PAYLOAD_BODY, box, (0.0, one.high[2]))
     for arm, stand in cell.stands.items():
-        (x, y, z), half = stand.place, 0.25 * cell.far
+        (x, y, z), half = stand.place, 0.25 * cell.ring.outer
         box = x - half, x + half, y - half, y + half
-        yield Region(arm, PAYLOADS, ARM_BODY, box, (0.0, z + 0.7 * cell.far))
+        yield Region(arm, PAYLOADS, ARM_BODY, box, (0.0, z + 0.7 * cell.ring.outer))
     for label, well in cell.wells.items():
         arm = cell.arm_of[label]
         yield Region(arm, PAYLOADS, POST_BODY, well.feeder.housing, (0.0, cell.top), label)

@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import pi
-from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from factory.apps.arms.circuit import candidates, circuit
 from factory.apps.arms.inverse import retreat, straight_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
+from factory.apps.arms.model import ArmModel
 from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
@@ -62,19 +62,19 @@ class ArmPlanner:
     Args:
         cell: where things stand.
         arm: the arm (index).
-        file: its MJCF.
+        model: its kind.
         bare: the layout without legs.
         pace: limits of the coordinate along its ways.
     """
 
     def __init__(
-        self, cell: Arrangement, arm: int, file: Path, bare: Layout, pace: WayLimits
+        self, cell: Arrangement, arm: int, model: ArmModel, bare: Layout, pace: WayLimits
     ) -> None:
         self.cell, self.arm, self.chain, self.pace = cell, arm, cell.chain, pace
         self.name, self.labels = cell.factory.robots[arm].name, cell.labels(arm)
         loads = {label: cell.loads(label) for label in self.labels}
         stand = cell.stands[arm]
-        self.scene = Scene(standing(file, stand), "", loads, [*cell.obstacles(arm, bare)])
+        self.scene = Scene(model, standing(model, stand), loads, [*cell.obstacles(arm, bare)])
         m = self.scene.m
         self._held = {
             label: [(m.geom_pos[g].copy(), m.geom_quat[g].copy()) for g in geoms]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array
+from factory.api import Array, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SEEDS,
@@ -114,3 +114,78 @@ def _farthest(chain: SerialChain, places: Array, turn: Array, q: Array) -> tuple
     if not reached:
         return 0, q
     return reached, rows.reshape(len(places), len(q), -1)[reached - 1][good[reached - 1]]
+
+
+BASES = (0.10, 0.14, 0.18, 0.22, 0.26, 0.30, 0.36, 0.42, 0.48)
+"""Heights at which the base of an arm may stand [m]."""
+
+STEP = 0.02
+"""Between the distances from the axis that are tried [m]."""
+
+ENOUGH = 0.12
+"""A ring that is wider than this is wide enough; among narrower ones the widest is taken [m]."""
+
+NEARER = 0.41
+"""Where in its ring an arm has the station, as a share of the ring's width."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ring:
+    """Where an arm works with its tool down, at all heights between two.
+
+    Attributes:
+        base: height of its base [m].
+        inner: least distance from its axis [m].
+        outer: greatest distance from its axis [m].
+    """
+
+    base: float
+    inner: float
+    outer: float
+
+    @property
+    def near(self) -> float:
+        """Distance of the station from its axis [m]."""
+        return self.inner + NEARER * (self.outer - self.inner)
+
+
+def ring_of(chain: SerialChain, low: float, high: float) -> Ring | None:
+    """The ring in which an arm comes with its tool down to all heights between two; None where
+    there is none.
+
+    Args:
+        chain: the arm.
+        low: least height of the tip of the tool above the floor [m].
+        high: greatest height [m].
+    """
+    radii = np.arange(STEP, chain.length, STEP)
+    turn = np.diag([1.0, -1.0, -1.0])
+    best: Ring | None = None
+    for base in BASES:
+        reached = np.ones(len(radii), bool)
+        for height in (low, (low + high) / 2, high):
+            places = np.stack([radii, np.zeros_like(radii), np.full_like(radii, height)], axis=1)
+            places[:, 2] -= base
+            rows = solutions(chain, places, np.tile(turn, (len(radii), 1, 1)), 16)
+            reached &= [
+                bool(len(q)) and float(least_singular_value(chain, q).max()) >= SINGULAR
+                for q in rows
+            ]
+        inner, outer = _longest(reached)
+        ring = Ring(base, float(radii[inner]), float(radii[outer]))
+        if outer > inner and (best is None or ring.outer - ring.inner > best.outer - best.inner):
+            best = ring
+        if best is not None and best.outer - best.inner > ENOUGH:
+            return best
+    return best
+
+
+def _longest(there: Truth) -> tuple[int, int]:
+    """The first and the last index of the longest run of what is there; equal where there is
+    none."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]])))
+    runs = edges.reshape(-1, 2)
+    if not len(runs):
+        return 0, 0
+    first, end = runs[int((runs[:, 1] - runs[:, 0]).argmax())]
+    return int(first), int(end) - 1

@@ -47,8 +47,9 @@ def chain_of(
     tool: str = "tool",
     values: Mapping[str, Sequence[float]] | None = None,
     name: str = "arm.xml",
+    files: Mapping[str, bytes] | None = None,
 ) -> SerialChain:
-    """The chain of the text of an MJCF file without meshes.
+    """The chain of the text of an MJCF file.
 
     Args:
         xml: the text.
@@ -56,9 +57,10 @@ def chain_of(
         values: `speed` and `acceleration` of each joint [rad/s, m/s, rad/s², m/s²], which come
             before those in the text.
         name: what errors call the text.
+        files: its meshes by name.
     """
     try:
-        m = mujoco.MjModel.from_xml_string(xml)
+        m = mujoco.MjModel.from_xml_string(xml, dict(files or {}))
     except ValueError as error:
         raise _compile_error(name, error) from error
     return _Reader(m, name, tool, values or {}).chain()

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.api import Array, Index, mujoco
+from factory.apps.arms.model import ArmModel
 
 NEED = 0.01
 """Clearance on transfers [m]."""
@@ -41,22 +42,22 @@ class Scene:
     """An arm among obstacles.
 
     Args:
-        arm: the arm's body in the world, with its names, and a body `tool`.
-        prefix: of its names.
+        model: the arm.
+        root: its MJCF, with the arm where it stands and a body `tool`.
         loads: by label, boxes of a part in the tool's frame as place, half sizes, quaternion.
         obstacles: what stands.
     """
 
     def __init__(
         self,
+        model: ArmModel,
         root: Element,
-        prefix: str,
         loads: Mapping[str, Sequence[tuple[Array, Array, Array]]],
         obstacles: Sequence[StandingBox],
     ) -> None:
         world = root.find("worldbody")
         assert world is not None
-        tool = next(b for b in world.iter("body") if b.get("name") == f"{prefix}tool")
+        tool = next(b for b in world.iter("body") if b.get("name") == "tool")
         for label, boxes in loads.items():
             for number, (place, half, turn) in enumerate(boxes):
                 ElementTree.SubElement(
@@ -79,7 +80,7 @@ class Scene:
                 pos=" ".join(map(str, ((low + high) / 2).tolist())),
                 size=" ".join(map(str, ((high - low) / 2).tolist())),
             )
-        self.m = m = mujoco.MjModel.from_xml_string(ElementTree.tostring(root, encoding="unicode"))
+        self.m = m = model.compiled(root)
         self.d = mujoco.MjData(m)
         self.names = [m.geom(g).name for g in range(m.ngeom)]
         solid = (m.geom_contype | m.geom_conaffinity) != 0
@@ -106,10 +107,12 @@ class Scene:
         """The pairs of links that may touch: those with two joints or more between them."""
         m, pairs = self.m, list[tuple[int, int]]()
         depth = [self._depth(int(m.geom_bodyid[g])) for g in range(m.ngeom)]
-        every = [*self.base, *self.links]
+        every, excluded = [*self.base, *self.links], {*m.exclude_signature.tolist()}
         for i, one in enumerate(every):
             for other in every[:i]:
-                if abs(depth[one] - depth[other]) >= 2:
+                bodies = sorted(int(m.geom_bodyid[g]) for g in (one, other))
+                left_out = (bodies[0] << 16) + bodies[1] in excluded
+                if abs(depth[one] - depth[other]) >= 2 and not left_out:
                     pairs.append((one, other))
         return pairs
 

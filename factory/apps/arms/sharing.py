@@ -1,6 +1,6 @@
 """What two arms at one station share: how far one must have gone before the other may come.
 
-A link is taken for a capsule that contains it, a payload for a ball.
+A link is taken for a capsule or a ball that contains it, a payload for a ball.
 """
 
 from __future__ import annotations
@@ -49,10 +49,9 @@ class SweptArm:
         """Those of an arm on a way, with what it carries at its tool, a part perhaps."""
         m, d = scene.m, scene.d
         geoms = [*scene.links, *scene.loads.get(label, ())]
-        balls = np.isin(geoms, [*scene.loads.get(label, ())])
-        round_ = balls | (m.geom_type[geoms] == BALL)
+        round_ = ~np.isin(m.geom_type[geoms], LONG)
         long = np.where(round_, 0.0, m.geom_size[geoms, 1])
-        radius = np.where(balls, m.geom_rbound[geoms], m.geom_size[geoms, 0])
+        radius = np.where(round_, m.geom_rbound[geoms], m.geom_size[geoms, 0])
         rows = []
         x = np.linspace(0.0, way.length, SAMPLES)
         gone = float(travels(chain, way, x, [*chain.bodies, *carried]).max())
@@ -65,7 +64,8 @@ class SweptArm:
         return cls(np.array(rows), radius, gone)
 
 
-BALL = int(mujoco.mjtGeom.mjGEOM_SPHERE)
+LONG = tuple(map(int, (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)))
+"""Geoms that a capsule contains; all others are taken for balls."""
 
 
 def clear_from(leaves: SweptArm, others: Sequence[SweptArm]) -> float | None:

@@ -176,6 +176,7 @@ def build_model(
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     add_robots(layout, catalogue, drives, section)
+    files |= layout.chains.files if layout.chains else {}
     load = max(masses[product] for product in factory.products)
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)

@@ -75,6 +75,10 @@ class Chains(Protocol):
         """The same for one who does not know which of them each follows."""
 
     @property
+    def files(self) -> Mapping[str, bytes]:
+        """The mesh files of their bodies by name."""
+
+    @property
     def timestep(self) -> float:
         """Longest timestep with which their drives follow them [s]."""
 

@@ -18,6 +18,7 @@ from factory.engine.mjcf.pads import trunks
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.floor.geometry.fused_bodies import Inside
 from factory.support.arrays import Index, Truth
+from factory.support.engine import mujoco
 
 SOFT = 0.02
 """Time constant of contacts of parts, the engine's own [s]."""
@@ -28,6 +29,14 @@ fall on each other press in by what they go in this time."""
 
 LAST = 2**32 - 1
 """The greatest of all signatures, which no pair has."""
+
+
+def of_one_robot(m: mujoco.MjModel, signature: int) -> bool:
+    """Whether both bodies of an excluded pair are of one robot, whose file leaves them out of
+    contact."""
+    one, other = m.body(signature >> 16).name, m.body(signature & 0xFFFF).name
+    robots = {names.kind(one), names.kind(other)} == {"robot"}
+    return robots and names.holder(one) == names.holder(other)
 
 
 class ContactMasks:
@@ -75,7 +84,10 @@ class ContactMasks:
             for number, body in enumerate(bodies[label], 1)
         }
         self.fresh: set[int] = set()
-        self._signatures: set[int] = set()
+        listed = m.exclude_signature.view(np.uint32)
+        self._signatures = {
+            pair for pair in listed[listed != LAST].tolist() if of_one_robot(m, pair)
+        }
 
     def _solid_geoms(self, bodies: Index) -> Index:
         """The geoms of bodies that collide: all except group 1, which convex pieces replace."""

@@ -19,7 +19,7 @@ from factory.engine.mjcf.feeders import SLIDER_MASS
 from factory.engine.mjcf.masks import masks_of
 from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
-from factory.engine.simulation.mujoco.contacts import ContactMasks
+from factory.engine.simulation.mujoco.contacts import ContactMasks, of_one_robot
 from factory.engine.simulation.mujoco.fusing import angles, rotations
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.probing import untouched
@@ -194,6 +194,8 @@ class Soundness:
         listed = self._m.exclude_signature.view(np.uint32)
         for signature in listed[listed != np.iinfo(np.uint32).max].tolist():
             pair = [self._body(signature >> 16), self._body(signature & 0xFFFF)]
+            if of_one_robot(self._m, signature):
+                continue
             if frozenset(map(names.part_of, pair)) not in apart:
                 yield " and ".join(pair)
 

@@ -1,0 +1,130 @@
+"""Arms by their MJCF: those that are shipped, and the user's own.
+
+A user's file is taken as the engine writes it again, so that angles are in radians, what it
+includes is in it, and its defaults are where they are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from factory.api import Diagnostic, InputError, Position, mujoco, usage_error
+from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.read import MODELS, chain_of
+
+KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
+"""The arms that are shipped."""
+
+STIFFNESS = 60.0
+"""That of drives for which a file has no gains [rad/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ArmModel:
+    """A kind of arm.
+
+    Attributes:
+        kind: its name, as a robot type.
+        file: where its MJCF is from.
+        text: the MJCF.
+        chain: what was read of it, to the site `tool`.
+        gains: of its drives: kp, kv, greatest torque [N m/rad, N m s/rad, N m].
+        files: its meshes by name.
+    """
+
+    kind: str
+    file: Path
+    text: str = field(repr=False)
+    chain: SerialChain = field(repr=False)
+    gains: tuple[tuple[float, float, float], ...] = field(repr=False)
+    files: Mapping[str, bytes] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, asked: str) -> ArmModel:
+        """That of a kind that is shipped, or of a file. Raises InputError: Usage where there is
+        none, BadArm where it cannot be used."""
+        if asked in KINDS:
+            file = MODELS / f"{asked}.xml"
+            return _model(asked, file, file.read_text("utf-8"), {})
+        file = Path(asked)
+        if file.suffix != ".xml" or not file.is_file():
+            hint = f"arms: {', '.join(KINDS)}; or the path of an MJCF file"
+            raise usage_error(f"there is no arm '{asked}'", hint)
+        return _own(file)
+
+    def root(self) -> Element:
+        """The MJCF."""
+        return ElementTree.fromstring(self.text)
+
+    def compiled(self, root: Element) -> mujoco.MjModel:
+        """The engine's model of an MJCF with this arm in it."""
+        text = ElementTree.tostring(root, encoding="unicode")
+        return mujoco.MjModel.from_xml_string(text, dict(self.files))
+
+
+def _own(file: Path) -> ArmModel:
+    """The arm of a user's file."""
+    kind = re.sub(r"\W", "_", file.stem, flags=re.ASCII)
+    kind = kind if kind[:1].isalpha() and kind not in KINDS else f"arm_{kind}"
+    try:
+        spec = mujoco.MjSpec.from_file(str(file))
+        spec.compile()
+        root = ElementTree.fromstring(spec.to_xml())
+    except ValueError as error:
+        message = f"the engine cannot compile it: {error}"
+        raise InputError(
+            Diagnostic("BadArm", message, Position(str(file), 1, 1), "valid MJCF")
+        ) from error
+    files = dict[str, bytes]()
+    compiler = root.find("compiler")
+    folder = file.parent / (compiler.get("meshdir", "") if compiler is not None else "")
+    for mesh in root.findall("asset/mesh"):
+        if (path := mesh.get("file")) is not None:
+            name = f"{kind}_{len(files)}{Path(path).suffix}"
+            files[name] = (folder / path).read_bytes()
+            if "name" not in mesh.attrib:
+                mesh.set("name", Path(path).stem)
+            mesh.set("file", name)
+    if compiler is not None:
+        for key in ("meshdir", "texturedir", "assetdir"):
+            compiler.attrib.pop(key, None)
+    return _model(kind, file, ElementTree.tostring(root, encoding="unicode"), files)
+
+
+@lru_cache(maxsize=8)
+def _read(text: str, name: str) -> SerialChain:
+    return chain_of(text, name=name)
+
+
+def _model(kind: str, file: Path, text: str, files: Mapping[str, bytes]) -> ArmModel:
+    chain = chain_of(text, name=file.name, files=files) if files else _read(text, file.name)
+    m = mujoco.MjModel.from_xml_string(text, dict(files))
+    return ArmModel(kind, file, text, chain, tuple(_gains(m, chain)), files)
+
+
+def _gains(m: mujoco.MjModel, chain: SerialChain) -> list[tuple[float, float, float]]:
+    """The gains of position servos of a file; for a joint without one those of a drive that is
+    critically damped with the inertia that the joint moves where the file draws it."""
+    gains = list[tuple[float, float, float]]()
+    servos = {
+        int(m.actuator_trnid[a, 0]): a
+        for a in range(m.nu)
+        if m.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and m.actuator_biasprm[a, 1] < 0
+    }
+    for joint, torque in enumerate(chain.limits.torque.tolist()):
+        force = torque if np.isfinite(torque) else 1e4
+        inertia = float(m.dof_M0[m.jnt_dofadr[joint]])
+        kp, kv = inertia * STIFFNESS**2, 2 * inertia * STIFFNESS
+        if joint in servos:
+            bias = m.actuator_biasprm[servos[joint]]
+            kp, kv = -float(bias[1]), -float(bias[2]) or kv
+        gains.append((kp, kv, force))
+    return gains
