@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sin
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+import numpy as np
+
 from factory.api import mujoco
+from factory.apps.arms.chain import SerialChain
 
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""
@@ -60,6 +63,20 @@ def standing(file: Path, stand: Stand, site: str = "tool") -> Element:
     tool.append(_cylinder("stem", SLIM * stand.pad, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1"))
     tool.append(_cylinder("pad", stand.pad, STEM - PAD, STEM, 0.0, GRAPHITE))
     return root
+
+
+def with_tool(chain: SerialChain) -> SerialChain:
+    """A chain to the tip of its tool, which it bears.
+
+    Args:
+        chain: the arm to its mount.
+    """
+    high = STEM - PAD
+    across = STEM_MASS * (high**2 / 12 + (SLIM * PAD_RADIUS) ** 2 / 4)
+    moment = np.diag([across, across, STEM_MASS * (SLIM * PAD_RADIUS) ** 2 / 2])
+    borne = chain.with_payload(STEM_MASS, np.array([0.0, 0.0, high / 2]), moment)
+    tip = chain.tool_place + chain.tool_turn @ [0.0, 0.0, STEM]
+    return replace(borne, tool_place=tip)
 
 
 def mass_of(file: Path) -> float:

@@ -24,7 +24,7 @@ from factory.api import (
     mujoco,
 )
 from factory.apps.arms.arrangement import Arrangement
-from factory.apps.arms.body import STEM
+from factory.apps.arms.body import with_tool
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
@@ -86,9 +86,7 @@ def laid_out(factory: Factory, rails: Layout, arm: Arm, pace: WayLimits) -> Layo
 
     Raises RunError: Unreachable, NoWay, Layout.
     """
-    chain = read_chain(arm.file)
-    tip = chain.tool_place + chain.tool_turn @ [0.0, 0.0, STEM]
-    cell = Arrangement(factory, rails, replace(chain, tool_place=tip))
+    cell = Arrangement(factory, rails, with_tool(read_chain(arm.file)))
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm.file, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})
