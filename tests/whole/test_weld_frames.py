@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from factory.apps.monitor.anatomy import check_holders
-from factory.engine.mjcf.weld_frames import WeldFrames, gaps, held_at
+from factory.engine.mjcf.weld_frames import SHALLOW, WeldFrames, gaps, held_at, joints_of
 from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
+from tests.arm_models import random_arm
 from tests.examples import without_hands
 
 
@@ -49,6 +50,42 @@ def test_gaps_are_what_the_engine_has_to_close(model: mujoco.MjModel) -> None:
     assert len(position) == model.neq
     found = gaps(model, welds, d.xpos, d.xmat)
     assert found == pytest.approx(np.linalg.norm(position, axis=1), abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_frames_at_the_end_of_long_chains_follow_from_their_joints(seed: int) -> None:
+    """Of random arms with hinges and slides, anywhere; beside one on a slide."""
+    spec = mujoco.MjSpec.from_string(random_arm(seed))
+    hand = spec.site("tool").parent
+    hand.name = "hand"
+    slider = spec.worldbody.add_body(name="slider", pos=[1, 2, 3])
+    slider.add_joint(type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[0, 0.6, 0.8])
+    slider.add_geom(size=[0.1, 0, 0])
+    for number, name in enumerate(("hand", "slider")):
+        part = spec.worldbody.add_body(name=f"part{number}", pos=[number + 1, 1, 0])
+        part.add_freejoint()
+        part.add_geom(size=[0.1, 0, 0])
+        weld = spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, objtype=mujoco.mjtObj.mjOBJ_BODY)
+        weld.name1, weld.name2 = name, f"part{number}"
+        weld.data[:11] = [0, 0, 0, 0.1, -0.2, 0.3, 0.5, 0.5, -0.5, 0.5, 1]
+    m = spec.compile()
+    if len(joints_of(m, m.body("hand").id)) <= SHALLOW:
+        pytest.skip("the chain is short")
+    d, draw = mujoco.MjData(m), np.random.default_rng(seed)
+    joints = [j for j in range(m.njnt) if m.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
+    d.qpos[m.jnt_qposadr[joints]] = draw.uniform(-2, 2, len(joints))
+    mujoco.mj_kinematics(m, d)
+    frames, welds = WeldFrames.of(m, d), np.arange(m.neq)
+    assert frames.deep.tolist() == [True, False]
+    for _ in range(20):
+        d.qpos[m.jnt_qposadr[joints]] = draw.uniform(-3, 3, len(joints))
+        mujoco.mj_kinematics(m, d)
+        at = d.qpos[frames.along]
+        assert np.abs(frames.at(at) - held_at(m, welds, d.xpos, d.xmat)).max() < 1e-12
+        for weld, turned in enumerate(frames.turned(at)):
+            turn = np.empty(4)
+            mujoco.mju_mulQuat(turn, d.xquat[m.eq_obj1id[weld]], m.eq_data[weld, 6:10])
+            assert min(np.abs(turned - turn).max(), np.abs(turned + turn).max()) < 1e-12
 
 
 def test_a_holder_that_turns_is_refused() -> None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import cos, sin
 from xml.etree.ElementTree import Element, SubElement
 
+import numpy as np
+
+from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.model import ArmModel
 
 STEM, PAD = 0.10, 0.004
@@ -103,6 +106,20 @@ def _own_contact(root: Element, base: str) -> Element:
         names = ["carriage" if name == base else name for name in names]
         SubElement(contact, "exclude", {"body1": names[0], "body2": names[1]})
     return contact
+
+
+def with_tool(chain: SerialChain) -> SerialChain:
+    """A chain to the tip of its tool, which it bears.
+
+    Args:
+        chain: the arm to its mount.
+    """
+    high = STEM - PAD
+    across = STEM_MASS * (high**2 / 12 + (SLIM * PAD_RADIUS) ** 2 / 4)
+    moment = np.diag([across, across, STEM_MASS * (SLIM * PAD_RADIUS) ** 2 / 2])
+    borne = chain.with_payload(STEM_MASS, np.array([0.0, 0.0, high / 2]), moment)
+    tip = chain.tool_place + chain.tool_turn @ [0.0, 0.0, STEM]
+    return replace(borne, tool_place=tip)
 
 
 def mass_of(model: ArmModel) -> float:

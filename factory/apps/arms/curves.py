@@ -157,14 +157,25 @@ class SoughtLegs:
         """Coordinates (b,) [m] of the points of the arms' legs that are nearest to configurations
         (b, n), and first derivatives there (b, n)."""
         x, first = np.empty(len(places)), np.empty_like(places)
-        for arm, (q, (grid, s)) in enumerate(zip(places, self._grids, strict=True)):
-            off = np.linalg.norm(grid - q, axis=-1)
-            row, at = np.unravel_index(int(off.argmin()), off.shape)
-            leg = self.legs[arm][int(row)]
-            (near,), _ = leg.way.nearest(q[None], s[row, at : at + 1])
+        for arm, q in enumerate(places):
+            leg, near, _ = self._nearest(arm, q)
             x[arm] = leg.reach + (leg.way.length - near if leg.brings else near)
             first[arm] = leg.at(x[arm : arm + 1])[1][0]
         return x, first
+
+    def apart(self, places: Array) -> Array:
+        """Distances (b,) of configurations (b, n) from the arms' legs [rad, m]."""
+        return np.array([self._nearest(arm, q)[2] for arm, q in enumerate(places)])
+
+    def _nearest(self, arm: int, q: Array) -> tuple[Leg, float, float]:
+        """The leg of an arm that is nearest to a configuration (n,), the coordinate of its way
+        there [m], and how far it is [rad, m]."""
+        grid, s = self._grids[arm]
+        off = np.linalg.norm(grid - q, axis=-1)
+        row, at = np.unravel_index(int(off.argmin()), off.shape)
+        leg = self.legs[arm][int(row)]
+        (near,), (apart,) = leg.way.nearest(q[None], s[row, at : at + 1])
+        return leg, float(near), float(apart)
 
     def along(
         self, rows: Index, places: Array, velocities: Array, near: Array

@@ -23,7 +23,7 @@ from factory.api import (
     RunError,
 )
 from factory.apps.arms.arrangement import Arrangement
-from factory.apps.arms.body import STEM
+from factory.apps.arms.body import with_tool
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
@@ -65,8 +65,7 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
 
     Raises RunError: Unreachable, NoWay, Layout.
     """
-    tip = arm.chain.tool_place + arm.chain.tool_turn @ [0.0, 0.0, STEM]
-    chain, several = replace(arm.chain, tool_place=tip), len(factory.robots) > 2
+    chain, several = with_tool(arm.chain), len(factory.robots) > 2
     for private in PRIVATE if several else (0.0,):
         cell = Arrangement(factory, rails, chain, private)
         layout, in_the_way = _with_legs(cell, arm, pace)

@@ -61,6 +61,10 @@ class BentWays:
         every = np.arange(len(self.robots))
         return self.ways.along(every, qpos[self.slides], qvel[self.dofs], np.zeros(len(every)))
 
+    def apart(self, qpos: Array) -> Array:
+        """How far robots (b,) are from their ways [m, rad]."""
+        return self.ways.apart(qpos[self.slides])
+
     def reached(self, ctrl: Array) -> Array:
         """The arc lengths [m] of their setpoints."""
         return self.ways.nearest(ctrl[self.drives])[0]

@@ -14,7 +14,7 @@ from factory.apps.monitor.agreement import Recorded, disagreements
 from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.explanation import SeenFirings
 from factory.apps.monitor.grips import Grips, misplaced
-from factory.apps.monitor.motion import AxisMotion, Lags
+from factory.apps.monitor.motion import AxisMotion, Lags, Straying
 from factory.apps.monitor.transfers import Transfers
 from factory.engine.record.findings import Violation
 
@@ -62,7 +62,7 @@ class Monitor:
         self.clock = _Clock(first.time, first.time, first.time, first.time)
         radius = np.array([max(subject.radii[o] for o in r.operations) for r in robots])
         self.motion = AxisMotion(anatomy, subject.settings, radius, first)
-        self.lags = Lags(anatomy, subject.settings)
+        self.lags, self.straying = Lags(anatomy, subject.settings), Straying(anatomy)
         self.grips = Grips(anatomy, float(radius.max()))
         self.transfers = Transfers(subject, anatomy, self._blame)
         self.transfers.begin(self.grips.switched(first))
@@ -105,6 +105,9 @@ class Monitor:
         self._look_at_parts(seen)
         for actuator, since in self.lags.stuck(seen):
             self._stuck(actuator, since, seen)
+        for robot, apart in self.straying.astray(seen):
+            words = f"its joints are {apart:.3f} m or rad from its way"
+            self._blame("Astray", robot, self._label(robot), words)
         late = clock.now - self.subject.patience
         if clock.changed < late and not clock.stalled and not self._waits(late):
             self._stalled()

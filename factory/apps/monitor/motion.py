@@ -28,6 +28,9 @@ LATENCY = 0.02
 TINY = 1e-9
 """Times that differ by less are equal [s]."""
 
+ASTRAY = 0.01
+"""Largest distance of a robot from a way along which several joints move it [m, rad]."""
+
 LATE = 0.2
 """Duration of a lag after which a robot is stuck [s]: that of braking from full speed."""
 
@@ -211,3 +214,19 @@ class Lags:
         since = self.since[actuators].tolist()
         self.since[actuators] = -np.inf
         return list(zip(actuators.tolist(), since, strict=True))
+
+
+class Straying:
+    """The robots that several joints move and that are away from their ways, each told of once."""
+
+    def __init__(self, anatomy: Anatomy) -> None:
+        self.bent, self.told = anatomy.bent, set[int]()
+
+    def astray(self, seen: Observation) -> list[tuple[int, float]]:
+        """The robots that are astray, and how far they are from their ways [m, rad]."""
+        if not len(self.bent.robots):
+            return []
+        apart = self.bent.apart(seen.qpos)
+        rows = [row for row in np.flatnonzero(apart > ASTRAY).tolist() if row not in self.told]
+        self.told.update(rows)
+        return [(int(self.bent.robots[row]), float(apart[row])) for row in rows]

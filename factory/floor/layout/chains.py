@@ -58,6 +58,9 @@ class SoughtCurves(Protocol):
     ) -> tuple[Array, Array]:
         """Those coordinates and the speeds (b,) along the curves of velocities (b, d)."""
 
+    def apart(self, places: Array) -> Array:
+        """Distances (b,) of places (b, d) from the robots' curves."""
+
 
 class Chains(Protocol):
     """What a layout says of its robots whose first axes move several joints."""

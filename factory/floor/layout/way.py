@@ -126,6 +126,11 @@ class Ways:
         x, first = self.nearest(places)
         return x, (velocities * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
+    def apart(self, places: Array) -> Array:
+        """Distances (n,) of places (n, 2) from the ways [m]."""
+        x, _ = self.nearest(places)
+        return np.asarray(np.linalg.norm(self.at(np.arange(len(x)), x)[0] - places, axis=1))
+
     def force(
         self, rows: Index, motion: tuple[Array, Array, Array], mass: Array, load: Array
     ) -> Array:

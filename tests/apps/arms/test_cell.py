@@ -1,0 +1,189 @@
+"""Cells of one arm and of two: proved, predicted, and made in both worlds; what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from factory.api import Diagnostic, RunError
+from factory.apps.arms.arming import armed
+from factory.apps.arms.arrangement import Arrangement
+from factory.apps.arms.model import ArmModel
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.coordinating import with_machines
+from factory.pipeline import Project, all_templates
+from factory.theory.lang import read_pag
+from factory.theory.nets.verify import verify
+from tests.arm_cells import SMALL, cell, chains, project, refusal, run
+from tests.command_line import Terminal, spawn
+
+ARMS = ("six", "six=2")
+
+SUBS = """root = x;
+x = mate ( y, z ); y = mate ( a, b ); z = mate ( c, d );
+a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
+TOOL = """root = x;
+x = weld ( y ); y = mate ( a, b ); a = atomic(); b = atomic()"""
+MIX = """mix = x, y;
+x = mate ( a, b ); y = mate ( c, d ); a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
+
+
+def column(height: float) -> str:
+    """A part on a column of a height [m]."""
+    return f"""root = x;
+x = mate ( a, b );
+a = atomic ( box = (0.1, 0.07, {height}), pos = (0, 0, {height / 2}) );
+b = atomic ( box = (0.05, 0.03, 0.02), pos = (0, 0, {height + 0.0102}) )"""
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    """The file of the small product."""
+    file = tmp_path / "drive.pag"
+    file.write_text(SMALL, "utf-8")
+    return file
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_the_net_of_a_cell_is_live_with_its_order_places(arm: str) -> None:
+    layout = cell(arm)
+    factory = layout.factory
+    assert len(factory.robots) == (2 if arm == "six" else 3)
+    proof = verify(factory.net)
+    assert proof.holds and proof.live and proof.safe and proof.reversible
+    assert layout.certificate is not None
+    apart = layout.certificate.apart
+    assert len(apart.orders) == (1 if arm == "six" else 3)
+    assert not with_machines(layout, apart.passes, apart.orders).deadlock
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_arms_take_parts_by_turns(arm: str) -> None:
+    taken = [robot.operations for robot in cell(arm).factory.robots[1:]]
+    assert [len(each) for each in taken] == ([4] if arm == "six" else [2, 2])
+
+
+@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+def test_a_cell_keeps_to_its_prediction(arm: str, world: str) -> None:
+    made = run(cell(arm), world=world, units=4)
+    assert made.succeeded and made.refines_net and made.products == 4
+    assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_cell_with_jitter_makes_its_units(arm: str) -> None:
+    made = run(cell(arm), units=3, jitter=0.3, seed=7)
+    assert made.succeeded and made.refines_net and made.products == 3
+    physics = made.physics
+    assert physics is not None and physics.product_error_max_mm is not None
+    assert physics.unintended_contacts == 0 and physics.pairs > 0
+    assert 0.0 < physics.handoff_gap_max_mm <= 0.1
+    assert 0.0 < physics.product_error_max_mm <= 0.01
+
+
+def test_two_arms_are_faster_than_one() -> None:
+    one, two = (Simulation(cell(arm), RunRequest("ideal", units=4)).cycle.seconds for arm in ARMS)
+    assert one is not None and two is not None and two < 0.97 * one
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_a_cell_is_made_to_the_byte(arm: str) -> None:
+    one, two = (
+        Simulation(layout, RunRequest()).model for layout in (cell(arm), project(SMALL, arm).layout)
+    )
+    assert one is not None and two is not None and one.xml == two.xml
+    assert [c.text for c in one.files.values()] == [c.text for c in two.files.values()]
+
+
+def test_the_command_line_makes_a_cell(drive: Path) -> None:
+    """In a process of its own."""
+    done = spawn("run", drive, "--arm", "six", "--units", "1", "--json")
+    assert done.status == 0, done.err
+    assert done.json["products"] == 1 and done.json["unintended_contacts"] == 0
+    assert done.json["refines_net"] and done.json["verdict"]["succeeded"]
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said", "hint"),
+    [
+        (["--arm", "seven"], "Usage", "no arm 'seven'", "six"),
+        (["--arm", "six=3"], "Usage", "one arm or two", "six=2"),
+        (["--arm", "six", "--relay"], "BadValue", "--relay", "leave out"),
+        (["--arm", "six", "--robots", "3"], "BadValue", "--robots", "leave out"),
+        (["--arm", "six", "--cycle", "9"], "BadValue", "--cycle", "leave out"),
+        (["--arm", "six", "--platen"], "BadValue", "--platen", "leave out"),
+    ],
+)
+def test_options_that_no_cell_has_are_refused(
+    words: list[str],
+    code: str,
+    said: str,
+    hint: str,
+    drive: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    done = Terminal(capsys)("run", drive, *words, "--json")
+    assert done.status == 2
+    (error,) = done.json["errors"]
+    assert error["code"] == code and said in error["message"] and hint in error["hint"]
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "said", "line"),
+    [
+        (SUBS, "NoCell", "joins the sub-assemblies 'y', 'z'", 2),
+        (TOOL, "NoCell", "'x' is made by a tool, weld", 2),
+        (MIX, "NoCell", "one product, not a mix", None),
+        (column(0.4), "Unreachable", "'b'", 4),
+    ],
+)
+def test_what_a_cell_cannot_make_is_refused_where_it_is(
+    text: str, code: str, said: str, line: int | None
+) -> None:
+    why = refusal(text)
+    assert why.code == code and said in why.message and "rails" in why.hint
+    assert (why.position.line if why.position else None) == line
+
+
+def test_three_arms_have_no_room() -> None:
+    text = SMALL.replace("root = box", "root = top; top = mate ( box, knob )")
+    text += "; knob = atomic ( cylinder = (0.008, 0.012), pos = (0, 0, 0.0665) )"
+    templates = all_templates()
+    rails = Project(read_pag(text, templates), templates)
+    factory = armed(rails, ArmModel.of("six"), 3).compiled
+    place = Arrangement(factory, rails.layout, ArmModel.of("six").chain)
+    with pytest.raises(RunError) as error:
+        place.stands  # noqa: B018
+    assert_layout(error.value.diagnostics, "3 arms have no room", "at most 2")
+
+
+def test_feeders_without_room_are_refused() -> None:
+    """Of ten broad parts at one arm."""
+    count, wide = 10, 0.3
+    joins = "".join(f"s{n} = mate ( s{n - 1}, p{n} ); " for n in range(1, count + 1))
+    parts = "; ".join(
+        f"p{n} = atomic ( box = ({wide}, {wide}, 0.01), pos = (0, 0, {0.0152 + 0.0102 * n}) )"
+        for n in range(1, count + 1)
+    )
+    base = "s0 = atomic ( box = (0.3, 0.3, 0.02), pos = (0, 0, 0.01) ); "
+    why = refusal(f"root = s{count}; {joins}{base}{parts}")
+    assert_layout((why,), "has no room round its arm", "more arms")
+
+
+def assert_layout(found: tuple[Diagnostic, ...], said: str, hint: str) -> None:
+    (why,) = found
+    assert why.code == "Layout" and said in why.message and hint in why.hint
+
+
+def test_what_a_cell_says_of_its_arms() -> None:
+    """Each operation of an arm has a leg; ways are of one length."""
+    layout = cell("six=2")
+    table = chains(layout)
+    lengths = {round(leg.way.length, 9) for leg in table.curves.legs}
+    assert len(lengths) == 1
+    for robot in layout.factory.robots[1:]:
+        rows = {table.row(operation, robot.index) for operation in robot.operations}
+        assert len(rows) == len(robot.operations)
