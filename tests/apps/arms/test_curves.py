@@ -134,15 +134,16 @@ def scene_of(stand: Stand, boxes: tuple[StandingBox, ...] = (), name: str = "six
 
 def swept_by(scene: Scene, chain: SerialChain, way: JointWay, label: str = "") -> SweptArm:
     """What an arm sweeps with its tool, and with a part that fills a ball round it."""
-    carried = [ConvexBody("part", len(chain), chain.tool_place[None], 0.12)]
+    carried = [ConvexBody("part", len(chain), chain.tool_place[None], 0.05)]
     return SweptArm.of(scene, chain, way, carried, label)
 
 
 def both_scenes(name: str) -> tuple[Scene, Scene]:
     """Two arms that face each other."""
+    off = {"six": 0.8, "scara": 0.6}[name]
     return (
-        scene_of(Stand((0.0, -0.45, 0.1), 1.57, PAD_RADIUS), name=name),
-        scene_of(Stand((0.0, 0.45, 0.1), -1.57, PAD_RADIUS), name=name),
+        scene_of(Stand((0.0, -off, 0.1), 1.57, PAD_RADIUS), name=name),
+        scene_of(Stand((0.0, off, 0.1), -1.57, PAD_RADIUS), name=name),
     )
 
 
