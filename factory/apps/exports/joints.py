@@ -22,25 +22,26 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
 
 
 def of_arms(
-    subject: Subject, form: str, ending: str, write: Callable[[Layout, int], str]
+    subject: Subject, name: str, ending: str, write: Callable[[Layout, int], str]
 ) -> str | Mapping[str, bytes]:
     """The text about an arm, or those of a folder. Raises InputError (Usage) for a factory without
     arms, or an unknown arm.
 
     Args:
         subject: a project.
-        form: name of the format.
+        name: of the format.
         ending: of the files in a folder, after the product's name and the arm's.
         write: gives the text about an arm (index) of a layout.
     """
     robots = subject.project.compiled.robots
     if not any(robot.body.first.moves for robot in robots):
-        message = f"format {form} is about arms; all robots of '{subject.file}' have guidepaths"
+        message = f"format {name} is about arms; all robots of '{subject.file}' have guidepaths"
         raise usage_error(message, "--arm six")
     layout = subject.project.layout
     arms = {robot.name: robot.index for robot in layout.factory.robots if robot.body.first.moves}
     if not subject.whole:
         return write(layout, arms[subject.choose([*arms], "arms")])
     return {
-        f"{subject.stem}.{name}.{ending}": write(layout, arm).encode() for name, arm in arms.items()
+        f"{subject.stem}.{robot}.{ending}": write(layout, arm).encode()
+        for robot, arm in arms.items()
     }

@@ -29,8 +29,8 @@ def check_run(project: Project, asked: RunOptions, log: bool = False) -> None:
     nothing is laid out for that. Files are read, but for pipes, which are read once."""
     asked.check(project)
     values = {"--faults": asked.faults is not None, "--spares": asked.spares > 0, "--log": log}
-    if given := [option for option, is_given in values.items() if is_given]:
-        project.compiled.check_rails(*given)
+    if options := [option for option, is_asked in values.items() if is_asked]:
+        project.compiled.check_rails(*options)
     if asked.faults is not None and not asked.faults.is_fifo():
         read_campaign(asked.faults, has_bodies=asked.world != "ideal")
 

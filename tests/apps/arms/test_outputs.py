@@ -170,7 +170,7 @@ def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.Mon
     with pytest.raises(FactoryError) as caught:
         with_arm(read(small.file), "six").layout  # noqa: B018
     (told,) = caught.value.diagnostics
-    assert told.code == "NoWay" and told.position and told.position.line == 5
+    assert told.code == "NoWay" and told.position and told.position.line == 6
     assert re.fullmatch(
         r"r2 finds no way from 'lid' to 'motor': .+ and .+ come 4.0 mm nearer to each other than"
         " they may",
