@@ -186,6 +186,8 @@ REFUSED = [
     (("run",), ("--spares", "1"), "--spares"),
     (("run",), ("--faults", "faults.toml"), "--faults"),
     (("run",), ("--faults", "faults.toml", "--spares", "1"), "--faults and --spares"),
+    (("view",), ("--port", "0"), "view"),
+    (("view",), ("--spares", "1", "--port", "0"), "view"),
     (("build",), ("-o", "made"), "-o DIR"),
     (("build",), ("-o", "made", "--mjcf", "made.xml"), "-o DIR"),
     (("report",), ("-o", "made.html"), "a report"),
