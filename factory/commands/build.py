@@ -76,6 +76,7 @@ def build(
             request.claim(options.file.stem)
         project = options.project(out.silent)
         request.claim(project.name)
+        request.check(project)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin

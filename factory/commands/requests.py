@@ -92,6 +92,7 @@ class ProjectOptions:
                 "--robots": self.robots is not None,
                 "--platen": self.platen or self.tile is not None,
                 "--arm": self.arm is not None,
+                "--floor": self.floor is not None,
                 "--parallel": bool(self.branches()),
                 "[lines]": bool(kept.lines()),
                 "[tees]": bool(kept.tees()),

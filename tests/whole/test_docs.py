@@ -134,7 +134,7 @@ def test_the_tutorial_shows_what_is_printed(
     "page",
     [
         *("index.md", "ten-minutes.md"),
-        *("guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
+        *("guide/arms.md", "guide/products.md", "guide/pace.md", "guide/faults.md", "guide/plc.md"),
         *("guide/revise.md", "theory/exercises.md", "theory/lecture.md"),
         *("theory/mixes.md", "theory/tees.md"),
     ],

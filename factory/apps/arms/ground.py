@@ -73,5 +73,5 @@ def with_arm(project: Project, asked: str) -> Project:
     )
     rails = project.with_pag(replace(project.pag, nodes=nodes))
     values = {name: getattr(made, name) for name in made.__dataclass_fields__}
-    ground = CellGround(project.ground.floor, model=model, rails=rails)
+    ground = CellGround(model=model, rails=rails)
     return CellProject(**{**values, "ground": ground})

@@ -151,12 +151,17 @@ class ArmPlanner:
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
     ) -> Diagnostic:
         position = self.cell.factory.by_label[label].position
-        for place in places:
-            why = diagnose_reach(self.chain, place, turn)
-            if why is not None:
-                return Diagnostic("Unreachable", why.message(label, self.name), position, RAILS)
-        by = f": {self.scene.say(blocked.pair)} are in each other's way" if blocked else ""
-        message = f"{self.name} has no configuration that brings '{label}'{by}"
+        for up in (0.0, self.cell.over_well):
+            for place in places:
+                why = diagnose_reach(self.chain, place + np.array([0.0, 0.0, up]), turn)
+                if why is not None:
+                    message = why.message(label, self.name, up)
+                    return Diagnostic("Unreachable", message, position, RAILS)
+        message = f"{self.name} has no configuration that brings '{label}'"
+        if blocked:
+            message += f": {self.scene.say(blocked.pair)} are in each other's way"
+        else:
+            message += f" and goes straight up by {self.cell.over_well * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
     def _later(self, label: str) -> set[str]:

@@ -46,17 +46,19 @@ class Unreachable:
         """Distance between the pose and the edge [m]; infinite where there is none."""
         return float("inf") if self.reach is None else abs(self.distance - self.reach)
 
-    def message(self, part: str, arm: str) -> str:
+    def message(self, part: str, arm: str, above: float = 0.0) -> str:
         """The text of a diagnostic.
 
         Args:
             part: label of what is at the pose.
             arm: name of the arm.
+            above: height of the pose above that at which the part is taken or placed [m].
         """
+        named = f"'{part}', {above * 1e3:.0f} mm above its place," if above else f"'{part}'"
         if self.singular is not None:
             limit = f"only within {SINGULAR:g} of a singular configuration"
-            return f"'{part}' is reached by {arm} {limit}"
-        where = f"'{part}' is {self.distance:.3f} m from the axis of {arm}"
+            return f"{named} is reached by {arm} {limit}"
+        where = f"{named} is {self.distance:.3f} m from the axis of {arm}"
         where += f", at {self.height:.2f} m above its base"
         if self.reach is None:
             return f"{where}; it comes to no place at that height so turned"

@@ -3,9 +3,10 @@ point of `factory.exporters` that defines `FORMAT`, `TAKES` and `export`.
 
 `FORMAT`: name of the format and, without `ENDING`, the ending of its files; `TAKES`: its source,
 "net" (a PAG, or a net in PNML), "pag", "log" or "factory" (a PAG or a log); `OF`: meaning of
-`--of`, where there is a choice. `export(subject)` returns a text, bytes where `BINARY` is set, or
-several files by name beside the requested one, which has the name ""; where the subject is `whole`,
-the files of a folder. The docstring is the line in `factory export --help`.
+`--of`, where there is a choice; `RAILS`: whether all robots need guidepaths. `export(subject)`
+returns a text, bytes where `BINARY` is set, or several files by name beside the requested one,
+which has the name ""; where the subject is `whole`, the files of a folder. The docstring is the
+line in `factory export --help`.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ class Exporter:
         of: what `--of` means, "" for nothing.
         folder: whether it can write a whole folder.
         ending: ending of its files, "" where that is the format's name.
+        rails: whether all robots need a guidepath.
         file: the module of a user's exporter; None for those shipped.
     """
 
@@ -48,6 +50,7 @@ class Exporter:
     of: str = ""
     folder: bool = False
     ending: str = ""
+    rails: bool = False
     file: Path | None = None
 
 
@@ -98,7 +101,7 @@ def _check(module: ModuleType, there: Mapping[str, Exporter]) -> None:
 
 def _exporter(module: ModuleType) -> Exporter:
     summary = " ".join((module.__doc__ or "").strip().partition("\n\n")[0].split())
-    words = ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER", "ENDING")
+    words = ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER", "ENDING", "RAILS")
     names = [name for name in words if hasattr(module, name)]
     fields = {name.lower(): getattr(module, name) for name in names}
     return Exporter(**fields, summary=summary, export=module.export)

@@ -82,6 +82,12 @@ class BuildRequest:
         """Where the model of a product of this `name` is written; None where it is not."""
         return self.mjcf or (self.output and self.output / f"{name}.xml")
 
+    def check(self, project: Project) -> None:
+        """Check that a project can be written, before it is laid out. Raises InputError (Usage)
+        where a folder is asked for of robots without guidepaths."""
+        if self.output is not None:
+            project.compiled.check_rails("-o DIR")
+
     def claim(self, name: str) -> None:
         """Declare the files that a build of this `name` writes, except meshes, before it begins.
         Raises InputError (BadFile)."""
@@ -126,6 +132,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     its goal in it, where the engine refuses the model, and where a file whose name is chosen here
     would be written through a link, or over what was read. Nothing is written then."""
     request.claim(project.name)
+    request.check(project)
     layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
     clearance = layout.certificate or certify(layout)

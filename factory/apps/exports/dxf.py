@@ -14,7 +14,7 @@ from factory.apps.exports.subject import Subject
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.layout import Box
 
-FORMAT, TAKES = "dxf", "pag"
+FORMAT, TAKES, RAILS = "dxf", "pag", True
 
 VERSION, MILLIMETRES = "R2013", 4
 """Version of DXF; code of the unit in the header."""

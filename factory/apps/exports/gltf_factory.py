@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.api import HIDDEN, Array, Diagnostic, InputError, Mesh, names, physical_model, rotation
+from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
@@ -46,7 +47,9 @@ def _state(subject: Subject) -> Replica:
         raise InputError(Diagnostic("Usage", message, None, "leave it out, or give a log"))
     project = subject.project
     model = physical_model(project.layout, 1, project.settings, project.catalogue)
-    return Replica(load(model))
+    replica = Replica(load(model))
+    replica.place(key_values(replica.m, joints_at_rest(project.layout))[0])
+    return replica
 
 
 def _row(log: Log, at: str) -> int:

@@ -5,6 +5,9 @@ A run drives each axis by three setpoints, written ahead, and lets bodies sleep.
 has one `position` actuator an axis, whose law is the same, and nothing sleeps. It starts as a run
 does. Each axis is at 0 then; a robot's goes up as it goes ahead, from B to A. What carries a weight
 at the start is balanced by a soft spring. So nothing moves while all setpoints are 0.
+
+The joints of a chain have the coordinates of its own file: where they start, and the setpoints that
+hold them there, are in the keyframe `home`.
 """
 
 from __future__ import annotations
@@ -16,9 +19,11 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from factory.api import Layout, Model, names
+from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.feeders import SLIDER_MASS
+from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.starting import start_positions
@@ -52,8 +57,15 @@ def written(model: Model) -> Model:
         section[:] = sorted(map(_position, section), key=_turn)
     _mask_what_is_fed(root)
     _add_sensors(root)
-    add(add(root, "keyframe"), "key", name="home")
+    key = add(add(root, "keyframe"), "key", name="home")
+    if rests := joints_at_rest(model.layout):
+        qpos, ctrl = key_values(load(_with_root(model, root)), rests)
+        key.attrib.update(qpos=numbers(qpos.tolist()), ctrl=numbers(ctrl.tolist()))
     ElementTree.indent(root)
+    return _with_root(model, root)
+
+
+def _with_root(model: Model, root: Element) -> Model:
     return replace(model, xml=ElementTree.tostring(root, encoding="unicode") + "\n")
 
 
@@ -77,7 +89,7 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
         names.joint(axis): Scale(at[axis.index], 1.0 if axis.motion.hangs else -1.0)
         for axis in layout.factory.axes
     }
-    for robot in layout.curves[0]:
+    for robot in () if layout.chains else layout.curves[0]:
         back, *further = layout.guidepaths[robot].framed(at[robot], at[robot])[0][0].tolist()
         (first, _), *others = names.moved_along(layout.factory.robots[robot])
         scales[first] = Scale(back, -1.0)
@@ -140,7 +152,7 @@ def _add_sensors(root: Element) -> None:
     """Position and speed of each axis, named after its joint, `r3/slide/position`; and where each
     part is, as seen by the robot, feeder or tray that a weld joins it to, named after the weld."""
     sensor = add(root, "sensor")
-    for actuator in root.iter("position"):
+    for actuator in root.iterfind("actuator/position"):
         joint = actuator.get("joint")
         add(sensor, "jointpos", name=f"{joint}/position", joint=joint)
         add(sensor, "jointvel", name=f"{joint}/speed", joint=joint)

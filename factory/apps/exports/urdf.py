@@ -27,7 +27,7 @@ from factory.floor.geometry.turning import upright
 if TYPE_CHECKING:
     from factory.api import mujoco
 
-FORMAT, TAKES = "urdf", "pag"
+FORMAT, TAKES, RAILS = "urdf", "pag", True
 
 GRAM = 1e-3
 """[kg]"""

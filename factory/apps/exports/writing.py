@@ -48,6 +48,8 @@ def check_taken(chosen: Exporter, file: Path, source: Source | None) -> None:
         if chosen.takes == "log":
             hint = "keep one first: `factory run FILE.pag --log OUT`"
         raise usage_error(message, hint)
+    if chosen.rails and isinstance(source, Project):
+        source.compiled.check_rails(f"format {chosen.format}")
 
 
 def takes_folder(chosen: Exporter, output: Path | None) -> bool:

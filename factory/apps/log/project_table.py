@@ -78,7 +78,9 @@ def project_table(
     text: str | None = None,
 ) -> dict[str, Any]:
     """The table of a factory, of the PAG and templates that it was compiled from, and of settings;
-    `text`: that of the PAG where it is not as it was read."""
+    `text`: that of the PAG where it is not as it was read. Raises InputError (Usage) for robots
+    without guidepaths."""
+    factory.check_rails("a plan (-o DIR) or a log (--log)")
     file = Path(pag.file)
     if text is None:
         written = file.is_file() and all(allowed.position for allowed in pag.allowed)

@@ -268,9 +268,10 @@ def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery
     before `run`.
 
     Raises InputError (BadFault) if a deviation names what is not there or needs bodies in the ideal
-    world, or if the robots run their own programs.
+    world, or if the robots run their own programs; Usage for robots without guidepaths.
     """
     supervisor = simulation.supervisor
+    simulation.layout.factory.check_rails("recovery (--faults, --spares)")
     if not isinstance(supervisor, Supervisor):
         message = "robots that run their own programs do not recover"
         raise InputError(Diagnostic("BadFault", message, None, "leave out --distributed"))

@@ -36,6 +36,7 @@ APART = (
         ("--relay", "--cycle", "--robots", "--parallel", "--platen", "[lines]", "[tees]"),
         "a cell has one carrier and its arms",
     ),
+    ("--arm", ("--floor",), "a cell is as large as its arm"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""

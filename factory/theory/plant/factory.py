@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+from factory.support.errors import usage_error
 from factory.support.showing import Pictured
 from factory.theory.nets.gears import GearNet, ascending
 from factory.theory.nets.undone import Joins
@@ -208,6 +209,20 @@ class Factory(Pictured):
     @cached_property
     def _up(self) -> Mapping[int, AxisId]:
         return {robot: AxisId(len(self.robots) + n) for n, robot in enumerate(self._lowered)}
+
+    def check_rails(self, *whats: str) -> None:
+        """Check that every robot has a guidepath, where something is done that needs one.
+
+        Args:
+            whats: what is done, in the words of its options.
+
+        Raises InputError (Usage) for a robot whose first axis moves several joints.
+        """
+        chains = [robot for robot in self.robots if robot.body.first.moves]
+        if chains and whats:
+            why = f"{chains[0].name} is a '{chains[0].type}', which follows no guidepath"
+            message = f"{' and '.join(whats)} cannot be combined with --arm yet: {why}"
+            raise usage_error(message, "leave out one of the two")
 
     def up(self, robot: int) -> AxisId | None:
         """The axis by which a robot (index) goes up and down; None where it stays at its

@@ -61,6 +61,7 @@ def view(
     check_server(host, expose)
     asked.check_combination()
     project = options.project(out.silent)
+    project.compiled.check_rails("view")
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
