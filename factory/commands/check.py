@@ -195,9 +195,8 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
     """Print the gears, the counts and the verdict."""
     from factory.theory.lang.source import counted
 
-    document = checked.as_json()
-    gears = document["gears"]
-    shown = gears if verbose else gears[:SHOWN]
+    counts, gears = checked.counts(), checked.verdict.gears
+    shown = checked.gears(None if verbose else SHOWN)
     rows = (
         (g["robot"], g["type"], _modes(g["places"], len(g["places"]) if verbose else MODES))
         for g in shown
@@ -208,12 +207,12 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
         say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
     made = checked.factory.pag.title if checked.factory else checked.name
     say(
-        f"{made}: {', '.join(counted(document[f'{noun}s'], noun) for noun in NOUNS)},"
-        f" largest mode {document['largest_mode']}"
+        f"{made}: {', '.join(counted(counts[f'{noun}s'], noun) for noun in NOUNS)},"
+        f" largest mode {counts['largest_mode']}"
     )
     words = {True: "yes", False: "NO", None: "undecided"}
-    names = checked.verdict.properties
-    say(", ".join(f"{name.replace('_', ' ')}: {words[document[name]]}" for name in names))
+    holds = {name: getattr(checked.verdict, name) for name in checked.verdict.properties}
+    say(", ".join(f"{name.replace('_', ' ')}: {words[told]}" for name, told in holds.items()))
     for alike in _by_property(checked.verdict.faults):
         for witness in alike if verbose else alike[:AGAINST]:
             say(f"  {witness}")

@@ -49,22 +49,33 @@ class Checked:
     coordinated: CoordinatedNet | None = None
     alone: tuple[int, ...] = ()
 
+    def counts(self) -> dict[str, int]:
+        """The numbers of robots, places, transitions and tokens, and the size of the largest
+        mode."""
+        subject = marked(self.net)
+        return {
+            "robots": len(self.verdict.gears),
+            "places": len(subject.net.places),
+            "transitions": len(subject.net.transitions),
+            "tokens": sum(subject.tokens),
+            "largest_mode": max((place.size for place in subject.net.places), default=0),
+        }
+
+    def gears(self, most: int | None = None) -> list[dict[str, Any]]:
+        """The gears as `check --json` lists them: all, or `most` of them."""
+        places = marked(self.net).net.places
+        return [_gear_json(gear, places) for gear in self.verdict.gears[:most]]
+
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
-        subject = marked(self.net)
-        places = subject.net.places
         blocked = self.matings.of_kind("blocked") if self.matings else ()
         no_grips = None if self.no_grips is None else [miss.as_json() for miss in self.no_grips]
         return {
             "product": self.name,
             "labels": self.labels,
-            "robots": len(self.verdict.gears),
-            "places": len(places),
-            "transitions": len(subject.net.transitions),
-            "tokens": sum(subject.tokens),
-            "largest_mode": max((p.size for p in places), default=0),
+            **self.counts(),
             **self.verdict.as_json(),
-            "gears": [_gear_json(gear, places) for gear in self.verdict.gears],
+            "gears": self.gears(),
             "part_pool": dict(self.pool),
             "approaches": self.matings.as_json() if self.matings else None,
             "clashes": [mating.clashes_as_json() for mating in blocked],

@@ -78,7 +78,11 @@ def housed_outlets(layout: Layout) -> Iterator[Outlet]:
 def feeder_of(layout: Layout, label: str) -> Feeder:
     """The feeder of a part: a housing over the place where the part is presented, and the post that
     carries it, behind the rear stop of the robot that it serves. Parts of one line share a housing,
-    in which they hang with their tops at one height."""
+    in which they hang with their tops at one height. Computed once."""
+    return layout.kept(_feeder, label)
+
+
+def _feeder(layout: Layout, label: str) -> Feeder:
     by_label, room = layout.factory.by_label, Clearance(layout.clearance).room
     operation = by_label[label]
     robot = operation.carrier

@@ -11,7 +11,15 @@ from factory.floor.layout.coordinating import HOME
 from factory.floor.layout.hands.leaving import SPARE
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.nearness import Near, Nearness, alike, distances, judged
+from factory.floor.layout.nearness import (
+    Near,
+    Nearness,
+    alike,
+    distances,
+    judged,
+    meeting,
+    nearest,
+)
 from factory.floor.layout.presence import Presence
 from factory.floor.layout.staying import goes_home
 from factory.theory.nets.coordinated import CoordinatedNet, Past
@@ -69,12 +77,19 @@ class Homeward(Nearness):
         if rises_first(layout, robot) and round(high - low, 6) > SPARE:
             low = high  # unless it counts as up from the beginning
 
+        there, its = self._on_stem(one, other)
+        needed = distances(there, its, layout.clearance)
+
+        def goes(at: float) -> Presence:
+            return replace(there, sweeps=(((at, home), (low, high)),))
+
         def clear(at: float) -> bool:
-            there = replace(one, sweeps=(((at, home), (low, high)),))
-            there, its = self._on_stem(there, other)
-            return judged(there, its, distances(there, its, layout.clearance)) is None
+            if layout.guidepaths[robot].bends:
+                return judged(goes(at), its, needed) is None
+            return nearest(goes(at), its, on_all) is None
 
         short, far = begin, home - SPARE
+        on_all = meeting(goes(min(short, far)), its, needed)  # on less of the way no others do
         if not layout.guidepaths[robot].travels or begin >= home or not clear(far) or clear(short):
             return None
         for _ in range(BISECTIONS):

@@ -96,9 +96,8 @@ class Layout(Keeping, Pictured):
 
     def grip(self, robot: int) -> Extent | None:
         """The box about the product's middle, in a robot's frame (u, t), that its hand and mast
-        take among the payloads; None for none."""
-        hand = self.hand(robot)
-        return None if hand is None else grip_of(hand, self.mount(robot))
+        take among the payloads; None for none. Computed once."""
+        return self.kept(_grip, robot)
 
     @cached_property
     def guidepath_length(self) -> float:
@@ -318,6 +317,11 @@ class Layout(Keeping, Pictured):
         """Length of the finished product along the output robot's heading [m]."""
         xlo, xhi, _, _ = self.outgoing
         return xhi - xlo
+
+
+def _grip(layout: Layout, robot: int) -> Extent | None:
+    hand = layout.hand(robot)
+    return None if hand is None else grip_of(hand, layout.mount(robot))
 
 
 def carriers(factory: Factory) -> list[int]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache, partial
 from itertools import permutations
 
 import numpy as np
@@ -121,9 +122,10 @@ Pair = tuple[Presence, Presence, Distances]
 def _ends(robots: Staying, operation: Operation) -> Iterator[Pair]:
     """Two robots at the end, the first without its payload, the second with it; of a robot that
     waits for its carrier the last stretch counts, and of a lift that is lowered its stroke."""
+    end = cache(partial(_end, robots, operation))
     carrier = operation.robots.index(operation.carrier)
     for pair in permutations(range(len(operation.robots)), 2):
-        one, other = (_end(robots, operation, slot, carrier in pair) for slot in pair)
+        one, other = (end(slot, carrier in pair) for slot in pair)
         yield replace(one, bodies=robots.own(one.robot)), other, (ACROSS,) * 3
 
 

@@ -18,12 +18,21 @@ import shapely
 from factory.floor.layout.crossings import near as near_boxes
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.presence import ACROSS, ALONG, ANY, ROUNDING, Presence
-from factory.floor.mating.depth import exact, rough
+from factory.floor.mating.depth import rough, spanned
 from factory.support.arrays import Array, Index, Indices
 
 BLOCK = 1 << 14
 """Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of
 presences."""
+
+Meeting = tuple[Array, Index, Index]
+"""Pairs of boxes (n,) of two presences: what they need [m], and the numbers of both."""
+
+FEW = 256
+"""Of more pairs of boxes than these the boxes that are near are looked for first."""
+
+SOME = 256
+"""So many presences have their hulls worked out at a time."""
 
 Distances = tuple[float, float, float]
 """What bodies need [m]: in one layer below payloads, among payloads, and in different layers."""
@@ -46,7 +55,7 @@ class Near:
 def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
     """The pairs of presences of different machines that come near, which keep a clearance [m]. Near
     linear."""
-    hulls = np.array([presence.hull for presence in presences]).reshape(-1, 2, 3)
+    hulls = _hulls(presences)
     machine = np.unique([presence.machine for presence in presences], return_inverse=True)[1]
     count = np.array([len(presence.boxes) for presence in presences])
     low, high = hulls[:, 0] - clearance / 2, hulls[:, 1] + clearance / 2
@@ -61,6 +70,17 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
             which, numbers = np.unique(some, return_inverse=True)
             boxes = _Boxes([presences[n] for n in which.tolist()], hulls[which])
             yield from boxes.nearest(numbers.reshape(-1, 2), clearance)
+
+
+def _hulls(presences: Sequence[Presence]) -> Array:
+    """The hull of each presence (n, 2, 3) [m], worked out for SOME of them at a time."""
+    hulls = [np.zeros((0, 2, 3))]
+    for begin in range(0, len(presences), SOME):
+        boxes = [presence.boxes for presence in presences[begin : begin + SOME]]
+        every, first = np.concatenate(boxes), np.cumsum([0, *map(len, boxes[:-1])])
+        low, high = np.minimum.reduceat(every[:, 0], first), np.maximum.reduceat(every[:, 1], first)
+        hulls.append(np.stack([low, high], axis=1))
+    return np.concatenate(hulls)
 
 
 class _Boxes:
@@ -82,7 +102,7 @@ class _Boxes:
         there = self._within(second, self._hulls[first], most)
         for pair, one, other in _combined(here, there, len(pairs)):
             lacking = _overlap(self._boxes[one], self._boxes[other])
-            lacking += needed[pair, _meeting(self._layers[one], self._layers[other])]
+            lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
             order = np.lexsort((other, one, lacking, pair))
             order = order[lacking[order] > ROUNDING]
             is_last = np.append(np.diff(pair[order]) > 0, True)[: len(order)]
@@ -148,14 +168,28 @@ def alike(one: Presence, other: Presence) -> Hashable:
 
 
 def judged(one: Presence, other: Presence, needed: Distances) -> Lacking | None:
-    """The bodies that come nearer than the `needed` distances, and by how much; edges count only if
-    faces do not decide."""
-    for lacking, i, j in sorted(_pairs(one, other, needed), reverse=True):
+    """The bodies that come nearer than the `needed` distances, and by how much."""
+    return nearest(one, other, meeting(one, other, needed))
+
+
+def nearest(one: Presence, other: Presence, boxes: Meeting) -> Lacking | None:
+    """Of some boxes of two presences those whose bodies come nearer than they may, and by how much;
+    edges count only if faces do not decide."""
+    need, here, there = boxes
+    if not len(need):
+        return None
+    by_box = need + _overlap(one.boxes[here], other.boxes[there])
+    pairs = sorted(zip(by_box.tolist(), here.tolist(), there.tolist(), strict=True), reverse=True)
+    for lacking, i, j in pairs:
+        if lacking <= ROUNDING:
+            return None
         need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
         solids = one.solid(i), other.solid(j)
-        if need + float(rough(*solids).bounds.min()) <= ROUNDING:
+        lacking = min(lacking, need + float(rough(*solids).bounds.min()))
+        if lacking <= ROUNDING:
             continue
-        if (lacks := min(lacking, need + float(exact(*solids).bounds.min()))) > ROUNDING:
+        edges = spanned(*solids).bounds.min(initial=np.inf)
+        if (lacks := min(lacking, need + float(edges))) > ROUNDING:
             return lacks, i, j
     return None
 
@@ -172,23 +206,24 @@ def distances(one: Presence, other: Presence, clearance: float) -> Distances:
     return apart, across if together and (bears or not hold) else apart, across
 
 
-def _meeting(layer: Index, beside: Index) -> Index:
+def _needed(layer: Index, beside: Index) -> Index:
     """Which of the distances bodies in some layers need to bodies in others."""
     alike = (layer == beside) | (layer == ANY) | (beside == ANY)
     return np.where(alike, np.maximum(layer, beside) == PAYLOADS, 2)
 
 
-def _pairs(one: Presence, other: Presence, needed: Distances) -> list[Lacking]:
-    """The pairs of boxes of two presences that come too near, and by how much."""
-    here = _within(one.boxes, other.hull, max(needed))
-    there = _within(other.boxes, one.hull, max(needed)) if len(here) else here
-    if not len(there):
-        return []
-    meeting = _meeting(one.layers[here][:, None], other.layers[there][None])
-    lacking = np.array(needed)[meeting]
-    lacking += _overlap(one.boxes[here][:, None], other.boxes[there][None])
-    pairs = zip(*np.nonzero(lacking > ROUNDING), strict=True)
-    return [(float(lacking[i, j]), int(here[i]), int(there[j])) for i, j in pairs]
+def meeting(one: Presence, other: Presence, needed: Distances) -> Meeting:
+    """The boxes of two presences that come nearer than the `needed` distances."""
+    here, there = np.arange(len(one.boxes)), np.arange(len(other.boxes))
+    if len(here) * len(there) > FEW:
+        here = _within(one.boxes, other.hull, max(needed))
+        there = _within(other.boxes, one.hull, max(needed)) if len(here) else here
+        if not len(there):
+            return np.zeros(0), here[:0], there
+    need = np.array(needed)[_needed(one.layers[here][:, None], other.layers[there][None])]
+    lacking = need + _overlap(one.boxes[here][:, None], other.boxes[there][None])
+    i, j = np.nonzero(lacking > ROUNDING)
+    return need[i, j], here[i], there[j]
 
 
 def _overlap(one: Array, other: Array) -> Array:

@@ -66,8 +66,10 @@ class MachineBodies:
     def swept(self, leg: Leg) -> Array:
         """The boxes (n, 2, 3) of all that they take on a leg."""
         points, second = leg
-        swept = self.boxes + np.sort(points, axis=0)[[0, -1]]
-        swept[self.rise, :, 2] += sorted(second)
+        ends = np.sort(points, axis=0)
+        swept = self.boxes + (ends if len(ends) == 2 else ends[[0, -1]])
+        if any(second):
+            swept[self.rise, :, 2] += sorted(second)
         return np.asarray(swept)
 
     def legs(self, first: Span, second: Span) -> Iterator[Leg]:
@@ -76,7 +78,7 @@ class MachineBodies:
         off = ALONG * (1.0 - abs(self.way[2]))
         low, high = min(first) - off, max(first) + off
         if self.bent is None:
-            yield np.outer([low, high], self.way), second
+            yield np.array([[low], [high]]) * self.way, second
             return
         for points in self.bent.pieces(low, high):
             yield np.pad(points, ((0, 0), (0, 1))), second
@@ -143,7 +145,8 @@ class Presence:
     @cached_property
     def boxes(self) -> Array:
         """The box that each body sweeps on each leg (m n, 2, 3) [m]."""
-        return np.concatenate([*map(self.bodies.swept, self.legs)])
+        swept = [*map(self.bodies.swept, self.legs)]
+        return np.concatenate(swept) if swept[1:] else swept[0]
 
     @cached_property
     def layers(self) -> Index:

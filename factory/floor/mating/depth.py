@@ -115,9 +115,13 @@ def rough(p: Polytope, q: Polytope) -> Difference:
 
 def exact(p: Polytope, q: Polytope) -> Difference:
     """All half-spaces: those of the faces and those that an edge of each spans."""
-    spanned = _spanned(p.edges, q.edges)
-    bounds = _support(spanned, p.vertices) + _support(-spanned, q.vertices)
-    return rough(p, q).and_those_of(Difference(spanned, bounds))
+    return rough(p, q).and_those_of(spanned(p, q))
+
+
+def spanned(p: Polytope, q: Polytope) -> Difference:
+    """The half-spaces that an edge of each spans."""
+    normals = _spanned(p.edges, q.edges)
+    return Difference(normals, _support(normals, p.vertices) + _support(-normals, q.vertices))
 
 
 def _spanned(p: Array, q: Array) -> Array:

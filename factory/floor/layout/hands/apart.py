@@ -13,6 +13,7 @@ from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back, halves, reach
 from factory.floor.layout.hands.surfaces import Way, swept
 from factory.support.arrays import Array, Truth
+from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import MAST
 
@@ -37,6 +38,7 @@ class HandsApart:
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.hand_of = holding, hand_of
+        self._middles: dict[tuple[int, int], float | None] = {}
 
     def over_fingers(self, kind: Kind, places: Places) -> Truth:
         """Whether a hand behind stays over the fingers of those below (n,)."""
@@ -59,13 +61,20 @@ class HandsApart:
             free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
                 places.radius
             ) + half
-        last = self.holding.last(robot)
-        brought = [label for label in last.before if label != NOPART]
-        if last.pile == NOPART and len(brought) > 1:
-            boxes = [self.holding.box(label) for label in brought]
-            middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
+        if (middle := self._middle(self.holding.last(robot), axis)) is not None:
             free &= (middle - places.at[:, axis]) * side >= halves(places.radius) + BESIDE / 2
         return free
+
+    def _middle(self, operation: Operation, axis: int) -> float | None:
+        """Position along an axis of the middle between the inputs of an operation that come from
+        opposite sides [m]; None where no two do. Cached."""
+        key = operation.index, axis
+        if key not in self._middles:
+            brought = [label for label in operation.before if label != NOPART]
+            apart = operation.pile == NOPART and len(brought) > 1
+            ends = [self.holding.box(label)[:, axis] for label in brought if apart]
+            self._middles[key] = float(np.mean([sum(end) / 2 for end in ends])) if apart else None
+        return self._middles[key]
 
     def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
         """Distance that a hand reaches over the line of a carrier whose tall mast comes along

@@ -33,6 +33,10 @@ PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
 
 
+NEAR = 1e-3
+"""Places whose distances differ by no more are as near as each other [m]."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Groups:
     """Groups (g,) of clear `places`: the indices of the two, or of one twice, `chosen` (g, 2); the
@@ -93,13 +97,26 @@ class Groups:
         """Share (g,) of the strength of such tips that is used."""
         return self.share if tip == "suction" else self.pinned
 
+    @property
+    def easy(self) -> bool:
+        """Whether some group costs nothing by suction, without waiting or being in the way: none of
+        two places is better than one place is then."""
+        return bool(((self.cost("suction") + self.waits == 0.0) & ~self.first).any())
+
     def rank(self, tip: TipName, beside: Array) -> Index:
-        """Rank of each group (g,): by the distance `beside` the best (g,), then cost, waiting,
-        being in the way, simplicity and strength."""
-        two, rank = self.chosen[:, 0] != self.chosen[:, 1], np.empty(len(self), np.intp)
-        keys = self.used(tip), two, self.first, self.waits, self.cost(tip), beside
-        rank[np.lexsort(keys)] = np.arange(len(self))
+        """Rank of each group (g,): by the distance `beside` the best (g,), then as `first_by`."""
+        rank = np.empty(len(self), np.intp)
+        rank[np.lexsort((*self._keys(tip), beside))] = np.arange(len(self))
         return rank
+
+    def first_by(self, tip: TipName) -> Index:
+        """The best group (1,), by cost, waiting, being in the way, simplicity and strength."""
+        return np.lexsort(self._keys(tip))[:1]
+
+    def _keys(self, tip: TipName) -> tuple[Array | Truth, ...]:
+        """The sort keys (g,) of all groups, the last first."""
+        two = self.chosen[:, 0] != self.chosen[:, 1]
+        return self.used(tip), two, self.first, self.waits, self.cost(tip)
 
     def keys(self, tip: TipName) -> tuple[float, ...]:
         """The sort key of the first group among groups of equal cost."""
@@ -152,6 +169,27 @@ def on_one_line(options: Sequence[Groups], way: tuple[float, float]) -> list[Gro
     off = np.abs(common - (every.min() + every.max()) / 2)
     best = common[np.lexsort((off, np.round(costs, 3)))[0]]
     return [option.among(line == best) for option, line in both]
+
+
+def together(
+    options: Sequence[Groups], by: TipName, u: tuple[float, float], t: tuple[float, float]
+) -> list[Groups]:
+    """A group for each label, the best combination: the carrier stands in one place for all of them
+    if possible, and among several the middle of the label wins."""
+    if len(options) == 1:
+        return [options[0].among(options[0].first_by(by))]
+    across = [option.across(t) for option in options]
+    tried = np.unique(np.round(np.concatenate(across), 4))
+    away, ranks, chosen = np.zeros(len(tried)), np.zeros(len(tried)), []
+    for option, at in zip(options, across, strict=True):
+        off, along = np.round(np.abs(at[:, None] - tried) / NEAR), option.across(u)
+        beside = np.abs(along - (along.min() + along.max()) / 2)
+        rank = option.rank(by, np.round(beside / NEAR))
+        chosen.append(np.argmin(off * len(rank) + rank[:, None], axis=0))
+        away += np.sqrt(off[chosen[-1], np.arange(len(tried))])
+        ranks += rank[chosen[-1]]
+    line = np.lexsort((ranks, np.round(away, 4)))[0]
+    return [o.among(at[line : line + 1]) for o, at in zip(options, chosen, strict=True)]
 
 
 def bad(share: Array, pinned: Array) -> Array:

@@ -75,7 +75,7 @@ class Hand:
     @property
     def width(self) -> float:
         """Width of its finger, or of the bar to its stem [m]."""
-        return float(widths(np.array(self.radius)))
+        return min(max(2 * self.radius, SLENDER), FINGER)
 
     @property
     def column(self) -> float:
@@ -86,4 +86,4 @@ class Hand:
 def widths(radius: Array) -> Array:
     """Widths (n,) of the fingers of pads of some radii (n,) [m]: no wider than the pads, within
     bounds."""
-    return np.clip(2 * radius, SLENDER, FINGER)
+    return np.minimum(np.maximum(2 * radius, SLENDER), FINGER)

@@ -48,8 +48,13 @@ class Holding:
         for robot, carrier in enumerate(self.on):
             if carrier >= 0:
                 self.axis[robot] = 1 - self.axis[carrier]
+        self._made: list[list[Operation]] = []
+        for each in factory.robots:
+            gear = (factory.operations[number] for number in each.operations)
+            self._made.append([o for o in gear if o.carrier == each.index])
         self._places: dict[tuple[str, Kind, int, int, float], Places] = {}
         self._boxes: dict[str, Array] = {}
+        self._box: dict[str, Array] = {}
         self._loads: dict[str, Loads] = {}
 
     def frames(self, robot: int) -> Iterator[tuple[Way, Way]]:
@@ -74,10 +79,9 @@ class Holding:
         """Whether a fixed robot takes what a robot brings, while no carrier is there."""
         return not self.factory.robots[self.last(robot).carrier].travels
 
-    def made(self, robot: int) -> list[Operation]:
+    def made(self, robot: int) -> Sequence[Operation]:
         """The operations of which a robot is the carrier."""
-        operations = (self.factory.operations[o] for o in self.factory.robots[robot].operations)
-        return [operation for operation in operations if operation.carrier == robot]
+        return self._made[robot]
 
     def last(self, robot: int) -> Operation:
         """The operation that a robot delivers to."""
@@ -131,8 +135,10 @@ class Holding:
 
     def box(self, label: str) -> Array:
         """The box (2, 3) of a sub-assembly."""
-        boxes = self.boxes(label)
-        return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        if label not in self._box:
+            boxes = self.boxes(label)
+            self._box[label] = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+        return self._box[label]
 
     def top(self, operation: Operation) -> float:
         """Height of the result of an operation [m]."""

@@ -27,6 +27,7 @@ from factory.floor.layout.hands.groups import (
     in_one_place,
     least,
     on_one_line,
+    together,
 )
 from factory.floor.layout.hands.hand import Hand, Kind
 from factory.floor.layout.hands.holding import held
@@ -44,9 +45,6 @@ LEVEL = 5e-5
 RISING = 0.075
 """A tower behind is no higher than this over the top of what its robot takes [m]: so far a feeder's
 pad has risen when the tower, which is 20 mm behind, comes to where it was."""
-
-NEAR = 1e-3
-"""Places whose distances differ by no more are as near as each other [m]."""
 
 Frames = Sequence[tuple[Way, Way]]
 """How a robot may lie: along u, to a carrier that lies along t."""
@@ -117,6 +115,8 @@ class OneHand:
         if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
             return ()
         groups = self._groups(hand.kind, tour, frames, 0.0)
+        if hand.kind == "below":
+            groups = self._paired(tour, groups)
         at = groups.places.at[groups.chosen]
         ends = np.array((hand.places[0], hand.places[-1]))
         away = np.minimum(*(np.abs(at - both).max(axis=(1, 2)) for both in (ends, ends[::-1])))
@@ -162,8 +162,11 @@ class OneHand:
         """The groups of each tour; empty if a tour has none."""
         options = list[Groups]()
         for tour in tours:
-            options.append(self._groups(kind, tour, frames, radius))
-            if not len(options[-1]):
+            groups = self._groups(kind, tour, frames, radius)
+            if kind == "below" and not radius and not groups.easy:
+                groups = self._paired(tour, groups)
+            options.append(groups)
+            if not len(groups):
                 return []
         return options
 
@@ -216,15 +219,14 @@ class OneHand:
         return places, np.logical_and.reduce([*checks.values(), np.ones(len(places), bool)]), first
 
     def _groups(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Groups:
-        """The groups of clear places by which a hand with such tips holds the label of a tour."""
+        """The clear places at which a hand with such tips holds the label of a tour, each alone."""
         places, free, first = self._clear(kind, tour, frames, radius)
         clear, first = places.chosen(free), first[free]
         waits, every = self.in_the_way.waits(tour, kind, clear, frames), np.arange(len(clear))
         alone = np.stack([every, every], axis=1)
         carries = kind == "below" and self.in_the_way.holding.is_carrier(tour)
         served = self._served(tour, clear) if carries else np.zeros(len(clear))
-        groups = Groups(clear, alone, clear.share, clear.pinned, served, first, waits)
-        return groups if radius or kind != "below" else self._paired(tour, groups)
+        return Groups(clear, alone, clear.share, clear.pinned, served, first, waits)
 
     def _paired(self, tour: int, alone: Groups) -> Groups:
         """Groups of one place, and of two on one line under what a tour brings."""
@@ -316,8 +318,9 @@ def _level(
     best: tuple[float, TipName, list[Groups]] = np.inf, "suction", []
     worst: tuple[float, ...] = (np.inf,)
     tips: tuple[TipName, ...] = "suction", "pin"
-    for height in np.unique(np.round(options[0].height, 5)).tolist()[: 1 if lifted else None]:
-        level = [o.among((np.abs(o.height - height) <= LEVEL) | lifted) for o in options]
+    heights = [np.inf] if lifted else np.unique(np.round(options[0].height, 5)).tolist()
+    for height in heights:
+        level = [o if lifted else o.among(np.abs(o.height - height) <= LEVEL) for o in options]
         for by in tips:
             costs = [option.cost(by) for option in level]
             low = [float(cost.min(initial=np.inf)) for cost in costs]
@@ -326,25 +329,8 @@ def _level(
                     option.among(cost <= bound + 1e-3)
                     for option, cost, bound in zip(level, costs, low, strict=True)
                 ]
-                chosen = _together(good, by, u, t)
+                chosen = together(good, by, u, t)
                 keys = max(one.keys(by) for one in chosen)
                 if (max(low), *keys) < worst:
                     best, worst = (max(low), by, chosen), (max(low), *keys)
     return best
-
-
-def _together(options: Sequence[Groups], by: TipName, u: Way, t: Way) -> list[Groups]:
-    """A group for each label, the best combination: the carrier stands in one place for all of them
-    if possible, and among several the middle of the label wins."""
-    across = [option.across(t) for option in options]
-    tried = np.unique(np.round(np.concatenate(across), 4))
-    away, ranks, chosen = np.zeros(len(tried)), np.zeros(len(tried)), []
-    for option, at in zip(options, across, strict=True):
-        off, along = np.round(np.abs(at[:, None] - tried) / NEAR), option.across(u)
-        beside = np.abs(along - (along.min() + along.max()) / 2) * (len(options) > 1)
-        rank = option.rank(by, np.round(beside / NEAR))
-        chosen.append(np.argmin(off * len(rank) + rank[:, None], axis=0))
-        away += np.sqrt(off[chosen[-1], np.arange(len(tried))])
-        ranks += rank[chosen[-1]]
-    line = np.lexsort((ranks, np.round(away, 4)))[0]
-    return [o.among(at[line : line + 1]) for o, at in zip(options, chosen, strict=True)]

@@ -28,9 +28,11 @@ def outermost(
     across it about points (n, 3), at least as far as is `at_least` (n,) [m]."""
     reach, (one, other) = at_least.copy(), (a for a in range(3) if a != side[0])
     x, y = points[:, one], points[:, other]
-    radii = np.broadcast_to(radius, x.shape)
+    radii, least = np.broadcast_to(radius, x.shape), float(reach.min(initial=np.inf))
     for body in bodies:
         out, low, high = body.out(side), body.low, body.high
+        if out - SAME <= least:
+            continue
         beside = np.hypot(
             np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),

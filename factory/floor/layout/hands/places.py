@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache, cached_property
 from math import floor, log10, pi
 
 import numpy as np
@@ -122,11 +123,16 @@ class Loads:
     def about(self, at: Array) -> tuple[Array, Array]:
         """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
         rest and under acceleration to any side."""
-        pulls = np.array([0.0, 0.0, -GRAVITY]) + SURGE * self.push * PUSHES
-        fx, fy, fz = force = pulls.T[:, None] * self.mass[:, None]
+        fx, fy, fz = force = self._pulled
         x, y, z = (self.centre - at[:, None]).T.swapaxes(1, 2)[..., None]
         moment = np.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
         return force.reshape(3, 1, -1), moment.reshape(3, len(at), fx.size)
+
+    @cached_property
+    def _pulled(self) -> Array:
+        """What each load is pulled and pushed by (3, n, 7) [N]."""
+        pulls = np.array([0.0, 0.0, -GRAVITY]) + SURGE * self.push * PUSHES
+        return np.asarray(pulls.T[:, None] * self.mass[:, None])
 
 
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
@@ -152,8 +158,7 @@ def places(
     surfaces = product.kept(Surfaces)
     _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
-    bodies = [b for part in parts for b in surfaces.bodies[part]]
-    low, high = np.array([b.low for b in bodies]), np.array([b.high for b in bodies])
+    low, high = np.moveaxis(surfaces.boxes(parts), 1, 0)
     points = _tried(low, high, centre, side)
     if kind == "below":
         points = np.concatenate([points, _lines(low, high, centre)])
@@ -309,18 +314,23 @@ def _covered(
     pad over which its bellows reach the surface, and the position of its face along the axis, on
     what stands out most under it [m]."""
     (axis, way), sizes = side, np.array(radii)
-    across = [a for a in range(3) if a != axis]
-    turns = np.arange(RAYS) * 2 * pi / RAYS
-    rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
-    ring = np.zeros((2 * RAYS + 1, 3))
-    ring[:-1, across] = np.concatenate([rim, rim / 2])
-    rims = points + sizes[:, None, None] * ring[:, None, None]
+    rims = points + sizes[:, None, None] * _ring(axis)[:, None, None]
     out = surfaces.outermost(parts, rims.reshape(-1, 3), side).reshape(rims.shape[:3])
     bodies = [body for part in parts for body in surfaces.bodies[part]]
     discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
     most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])
     reached = most - out <= BELLOWS * sizes[:, None]
-    return np.asarray(reached.mean(axis=0)), way * most
+    return np.count_nonzero(reached, axis=0) / len(reached), way * most
+
+
+@cache
+def _ring(axis: int) -> Array:
+    """Where in a pad of radius 1 across an axis it is looked at what that covers (13, 3): on its
+    rim, half-way there, and in its middle."""
+    turns, ring = np.arange(RAYS) * 2 * pi / RAYS, np.zeros((2 * RAYS + 1, 3))
+    rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    ring[:-1, [a for a in range(3) if a != axis]] = np.concatenate([rim, rim / 2])
+    return ring
 
 
 def strain(tip: Tip, side: tuple[int, int], radius: Array, load: tuple[Array, Array]) -> Array:

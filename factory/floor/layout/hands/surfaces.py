@@ -148,11 +148,14 @@ class Surfaces:
 
     def __init__(self, product: Product) -> None:
         self.bodies = {label: tuple(Body.of(solid)) for label, solid in product.solids.items()}
+        self._boxes = {
+            label: np.array([(body.low, body.high) for body in bodies]).reshape(-1, 2, 3)
+            for label, bodies in self.bodies.items()
+        }
 
     def boxes(self, parts: Iterable[str]) -> Array:
         """The boxes (n, 2, 3) of the bodies of some parts."""
-        corners = [(body.low, body.high) for part in parts for body in self.bodies[part]]
-        return np.array(corners).reshape(-1, 2, 3)
+        return np.concatenate([self._boxes[part] for part in parts])
 
     def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
         """Extent of some parts on a side, an axis and a way (+1, -1) along it, where lines along
@@ -227,8 +230,10 @@ def near(low: Array, high: Array, boxes: Array) -> Truth:
 def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:
     """Which boxes from `low` to `high` (n, 3) overlap which of `boxes` (m, 2, 3) by more than
     `spare` [m] (n, m)."""
-    overlapping = np.ones((len(low), len(boxes)), bool)
-    for axis in range(3):
-        overlapping &= low[:, None, axis] < boxes[:, 1, axis] - spare
-        overlapping &= high[:, None, axis] > boxes[:, 0, axis] + spare
-    return overlapping
+    begin, end = boxes[:, 0].T + spare, boxes[:, 1].T - spare
+    overlapping = low[:, :1] < end[0]
+    overlapping &= high[:, :1] > begin[0]
+    for axis in (1, 2):
+        overlapping &= low[:, axis, None] < end[axis]
+        overlapping &= high[:, axis, None] > begin[axis]
+    return np.asarray(overlapping)
