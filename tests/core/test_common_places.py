@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from factory.floor.geometry.common_places import APART, CommonPlace, Top, common_places
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Solid
-from factory.floor.geometry.suction import EVEN, drawn_triangles, height_in
+from factory.floor.geometry.suction import EVEN, Terrain, drawn_triangles
 from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import read_pag
 
@@ -50,7 +50,7 @@ def faults(found: list[CommonPlace], parts: list[Solid]) -> list[str]:
                 told.append("pads meet")
         for part in (parts[n] for n in place.parts):
             under = place.at - place.radius - 1e-6, place.at + place.radius + 1e-6
-            if height_in(drawn_triangles(part), *under) < part.high[2] - EVEN:
+            if Terrain.of(drawn_triangles(part)).height_in(*under) < part.high[2] - EVEN:
                 told.append("not on the top")
             if (under[0] < part.low[:2] - 2e-6).any() or (under[1] > part.high[:2] + 2e-6).any():
                 told.append("out over a side")

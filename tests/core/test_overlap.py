@@ -10,7 +10,8 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 
-from factory.floor.geometry.overlap import common, drawn, swept
+from factory.floor.geometry.distances import distances_to
+from factory.floor.geometry.overlap import _deepest, common, drawn, merged, swept
 from factory.floor.geometry.product import product_geometry
 from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import load_pag
@@ -47,6 +48,16 @@ FRAME = block(80, 80, 60) - block(40, 40, 100)
 def test_the_depth_is_the_least_erosion_that_parts_two_solids(one, other, depth):
     for a, b in ((one, other), (other, one)):
         assert 1e3 * common(a, b).depth == pytest.approx(depth, rel=0.02, abs=1e-6)
+
+
+def test_the_deepest_point_is_that_of_all_distances():
+    """Points that are not measured are no deeper."""
+    points = np.random.default_rng(0).uniform(-0.03, 0.03, (200, 3))
+    for body in (FRAME, rod(30, 60), Manifold.sphere(0.03, 64)):
+        vertices, faces = merged(body.to_mesh64())
+        every = distances_to(points, vertices[faces])
+        box = np.array([[-1.0] * 3, [1.0] * 3])
+        assert _deepest(points, body, box) == (every.max(), every.argmax())
 
 
 def test_depths_do_not_depend_on_where_the_product_is():

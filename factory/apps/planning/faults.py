@@ -15,7 +15,7 @@ import numpy as np
 
 from factory.api import Array, Diagnostic, InputError, Solid, listing
 from factory.apps.planning.parts import PlacedPart
-from factory.floor.geometry.overlap import Common, common, drawn
+from factory.floor.geometry.overlap import Common, drawn, overlap_of
 from factory.floor.geometry.overlapping import near_pairs
 from factory.floor.geometry.touching import connected
 from factory.floor.geometry.touching_groups import groups_of
@@ -161,7 +161,7 @@ def _inside(
         if threaded or bodies[one] is None or bodies[other] is None:
             continue
         small, large = sorted((one, other), key=lambda n: float(bodies[n].volume()))
-        shared = common(bodies[small], bodies[large])
+        shared = overlap_of(solids[small], solids[large])
         share = shared.volume / float(bodies[small].volume())
         thinner = min(2 * bodies[n].volume() / bodies[n].surface_area() for n in (one, other))
         if share > MOST or (share > SHARE and shared.depth > min(DEPTH, THIN * thinner)):

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.overlap import distances_to, merged
+from factory.floor.geometry.distances import distances_to
+from factory.floor.geometry.overlap import merged
 
 ENOUGH = 2000
 """A body of so many triangles is coarse enough."""

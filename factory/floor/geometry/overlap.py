@@ -21,11 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import Any
 from weakref import finalize
 
 import numpy as np
 
+from factory.floor.geometry.distances import distances_to
 from factory.floor.geometry.meshes import is_closed, normals_of
 from factory.floor.geometry.pieces import closed_bodies
 from factory.floor.geometry.solids import Solid, rotation
@@ -53,8 +55,8 @@ BEYOND = 1e-9
 RAY = np.sqrt([2.0, 3.0, 5.0]) / np.sqrt(10.0)
 """The direction of rays that tell inside from outside: no special one."""
 
-CHUNK = 400_000
-"""The most distances between points and triangles that are computed at a time."""
+AT_ONCE = 16
+"""So many points are measured before it is looked whether others may be deeper."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +86,22 @@ def drawn(solid: Solid) -> Any:
         _DRAWN[key] = _made(solid)
         finalize(solid, _DRAWN.pop, key, None)
     return _DRAWN[key]
+
+
+_SHARED: dict[tuple[int, int], Common] = {}
+"""The overlaps of existing solids, by identity."""
+
+
+def overlap_of(one: Solid, other: Solid) -> Common:
+    """The overlap of two parts that bound volumes, computed once."""
+    if one.label > other.label:
+        one, other = other, one
+    key = id(one), id(other)
+    if key not in _SHARED:
+        _SHARED[key] = common(drawn(one), drawn(other))
+        for solid in (one, other):
+            finalize(solid, _SHARED.pop, key, None)
+    return _SHARED[key]
 
 
 def _made(solid: Solid) -> Any:
@@ -222,18 +240,21 @@ def united(bodies: Iterable[Any]) -> float:
     return float(Manifold.batch_boolean([*bodies], OpType.Add).volume())
 
 
-def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
+def common(
+    one: Any, other: Any, both: bool = True, samples: int = SAMPLES, shared: Any = None
+) -> Common:
     """The overlap of two bodies. `both`: the depth is the lesser of the two erosions; otherwise
-    that of the `other`. With few `samples` the depth is a lower bound, computed faster."""
-    shared = one ^ other
+    that of the `other`. With few `samples` the depth is a lower bound, computed faster. `shared`:
+    their common volume, where it is known."""
+    shared = one ^ other if shared is None else shared
     volume = float(shared.volume())
     if shared.is_empty() or volume <= LEAST:
         return APART
     points = _within(shared, one, other, samples)
     bodies = (one, other) if both else (other,)
-    depths = min((_distances(points, body, shared) for body in bodies), key=np.max)
     box = np.array(shared.bounding_box()).reshape(2, 3)
-    return Common(volume, float(depths.max()), points[depths.argmax()], box)
+    depth, deepest = min((_deepest(points, body, box) for body in bodies), key=itemgetter(0))
+    return Common(volume, depth, points[deepest], box)
 
 
 def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
@@ -266,54 +287,26 @@ def _is_inside(point: Array, body: Any) -> bool:
     return bool(sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0)
 
 
-def _distances(points: Array, body: Any, shared: Any) -> Array:
-    """The distances (n,) [m] of points from the surface of a body, at most the longest edge of the
-    box of the common volume."""
+def _deepest(points: Array, body: Any, box: Array) -> tuple[float, int]:
+    """The greatest distance of points from the surface of a body [m], at most the longest edge of
+    the box (2, 3) of the common volume, and the number of the first point at it. A point that is
+    nearer to a corner or middle of a triangle is not measured."""
+    from scipy.spatial import cKDTree
+
     vertices, faces = merged(body.to_mesh64())
-    box = np.array(shared.bounding_box()).reshape(2, 3)
     most = float((box[1] - box[0]).max())
     corners = vertices[faces]
     near = (corners.max(axis=1) >= box[0] - most).all(axis=1)
     near &= (corners.min(axis=1) <= box[1] + most).all(axis=1)
-    return np.asarray(np.minimum(most, distances_to(points, corners[near])))
-
-
-def distances_to(points: Array, triangles: Array) -> Array:
-    """The distance (n,) [m] of each point from the nearest of triangles (m, 3, 3); infinite if
-    there are none."""
-    distances = np.full(len(points), np.inf)
-    step = max(1, CHUNK // max(1, len(triangles)))
-    for first in range(0, len(points) if len(triangles) else 0, step):
-        rows = slice(first, first + step)
-        distances[rows] = _to_triangles(points[rows], triangles)
-    return distances
-
-
-def _to_triangles(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from the nearest of triangles (m, 3, 3). Candidates are the
-    triangles whose bounding balls are as near as the nearest centre."""
-    middles = triangles.mean(axis=1)
-    balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
-    squared = (points**2).sum(axis=1)[:, None] + (middles**2).sum(axis=1)
-    apart = np.sqrt(np.maximum(squared - 2 * points @ middles.T, 0.0))
-    row, column = np.nonzero(apart - balls <= apart.min(axis=1)[:, None] + BEYOND)
-    distances = np.full(len(points), np.inf)
-    np.minimum.at(distances, row, _to_each(points[row], triangles[column]))
-    return distances
-
-
-def _to_each(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from its own triangle (n, 3, 3)."""
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    normals = np.cross(edges[:, 0], -edges[:, 2])
-    area = np.einsum("ij,ij->i", normals, normals)
-    inside, squared = area > 0, np.full(len(points), np.inf)
-    height = np.einsum("ij,ij->i", points - triangles[:, 0], normals) ** 2
-    for corner in range(3):
-        off, edge = points - triangles[:, corner], edges[:, corner]
-        length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
-        share = np.clip(np.einsum("ij,ij->i", off, edge) / length, 0.0, 1.0)
-        beside = off - share[:, None] * edge
-        squared = np.minimum(squared, np.einsum("ij,ij->i", beside, beside))
-        inside &= np.einsum("ij,ij->i", off, np.cross(normals, edge)) >= 0
-    return np.asarray(np.sqrt(np.where(inside, height / np.where(area > 0, area, 1.0), squared)))
+    corners = corners[near]
+    if not len(corners):
+        return most, 0
+    some = np.concatenate([vertices[np.unique(faces[near])], corners.mean(axis=1)])
+    bounds = np.minimum(most, cKDTree(some).query(points)[0] + BEYOND)
+    order, distances = np.argsort(-bounds, kind="stable"), np.full(len(points), -np.inf)
+    for first in range(0, len(points), AT_ONCE):
+        rows = order[first : first + AT_ONCE]
+        if bounds[rows[0]] < distances.max():
+            break
+        distances[rows] = np.minimum(most, distances_to(points[rows], corners))
+    return float(distances.max()), int(distances.argmax())

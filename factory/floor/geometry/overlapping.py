@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.floor.geometry.decomposition import collides_as_hull
 from factory.floor.geometry.facets import sagitta
-from factory.floor.geometry.overlap import common, drawn
+from factory.floor.geometry.overlap import drawn, overlap_of
 from factory.floor.geometry.solids import Product, Solid
 from factory.support.arrays import Indices
 from factory.support.errors import Diagnostic
@@ -112,9 +112,11 @@ def overlaps_of(product: Product, *insides: frozenset[str]) -> DrawnOverlaps:
 
 
 def _found(product: Product, insides: Insides) -> DrawnOverlaps:
+    twin = product.twin[0] if product.twin is not None else product  # a turn changes no overlap
+    measured = twin if twin.solids.keys() == product.solids.keys() else product
     solids = {
-        label: solid
-        for label, solid in product.solids.items()
+        label: measured.solids[label]
+        for label in product.solids
         if not insides or any(label in inside for inside in insides)
     }
     labels, bodies = [*solids], [drawn(solid) for solid in solids.values()]
@@ -124,7 +126,7 @@ def _found(product: Product, insides: Insides) -> DrawnOverlaps:
         if insides and not any(both <= inside for inside in insides):
             continue
         if bodies[one] is not None and bodies[other] is not None:
-            shared = common(bodies[one], bodies[other])
+            shared = overlap_of(solids[labels[one]], solids[labels[other]])
             if shared.depth > SILENT:
                 off = max(sagitta(bodies[n], *shared.box) for n in (one, other))
                 small = min((one, other), key=lambda n: float(bodies[n].volume()))

@@ -54,7 +54,7 @@ def pad_place(
     middle are preferred."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
     widest = max(min(WIDEST, SHARE * float((high - low).min())), NARROWEST)
-    faces, drawn = _pieces(solid), drawn_triangles(solid)
+    faces, drawn = Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))
     for radius in (widest, widest / 2, widest / 4):
         places = _grid(solid, radius)
         centre = places[0]
@@ -66,13 +66,13 @@ def pad_place(
     best, worst = None, (np.inf, np.inf)
     for place in places:
         under = place - radius, place + radius
-        top = min(height_in(faces, *under), float(solid.high[2]))  # of a ball what is round it
+        top = min(faces.height_in(*under), float(solid.high[2]))  # of a ball what is round it
         way = np.minimum(under[0], np.where(ahead > 0, low, under[0]))
         end = np.maximum(under[1], np.where(ahead < 0, high, under[1]))
-        if height_in(faces, way, end) > top + EVEN or not np.isfinite(top):
+        if faces.height_in(way, end) > top + EVEN or not np.isfinite(top):
             continue
-        empty = top - height_in(drawn, place - radius / 4, place + radius / 4)
-        off = top - height_in(drawn, *under), min(empty, radius) if empty > EVEN else 0.0
+        empty = top - drawn.height_in(place - radius / 4, place + radius / 4)
+        off = top - drawn.height_in(*under), min(empty, radius) if empty > EVEN else 0.0
         if off[0] < EVEN and not off[1]:
             return _at(place, top, radius)
         if off < worst:
@@ -99,12 +99,29 @@ def _at(place: Corner, top: float, radius: float) -> PadPlace:
     return PadPlace(np.array([*place, top + GAP]), radius)
 
 
-def height_in(triangles: Array, low: Corner, high: Corner) -> float:
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """Triangles (n, 3, 3), and the corners `low` and `high` (n, 2) of their boxes in plan [m]."""
+
+    triangles: Array
+    low: Array
+    high: Array
+
+    @classmethod
+    def of(cls, triangles: Array) -> Terrain:
+        """The terrain of triangles (n, 3, 3)."""
+        plan = triangles[..., :2]
+        return cls(triangles, plan.min(axis=1), plan.max(axis=1))
+
+    def height_in(self, low: Corner, high: Corner) -> float:
+        """The greatest height over a rectangle in plan, -inf if nothing is there."""
+        kept = ((self.low <= high) & (self.high >= low)).all(axis=1)
+        return _height_in(self.triangles[kept], low, high)
+
+
+def _height_in(near: Array, low: Corner, high: Corner) -> float:
     """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
     at the corners of the rectangle, at theirs, and where edges cross its sides."""
-    a, b, c = triangles[:, 0, :2], triangles[:, 1, :2], triangles[:, 2, :2]
-    kept = (np.minimum(np.minimum(a, b), c) <= high) & (np.maximum(np.maximum(a, b), c) >= low)
-    near = triangles[kept.all(axis=1)]
     if not len(near):
         return -np.inf
     points = [near.reshape(-1, 3), _over_corners(near, low, high)]

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from factory.floor.geometry.decimation import ENOUGH, Coarse, decimated
 from factory.floor.geometry.meshes import Mesh, hull_of, is_closed, volume_of
 from factory.floor.geometry.overlap import (
-    SAMPLES,
     Common,
     bounded,
     common,
     drawn,
+    overlap_of,
     swept,
     united,
 )
@@ -225,7 +225,7 @@ class DrawnWays:
         """The overlap of two parts in the finished product."""
         key, overlaps = (self._labels[one], self._labels[other]), self._found.finished
         if key not in overlaps:
-            overlaps[key] = common(self._body(one), self._body(other))
+            overlaps[key] = overlap_of(self._solids[one], self._solids[other])
         return overlaps[key]
 
     def _cuts(self, moving: int, standing: int, axis: int, sign: int) -> bool:
@@ -243,25 +243,18 @@ class DrawnWays:
     def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float] | None:
         """How deep the first part gets into the second on its way, and where [m]; None if they do
         not meet. The depth of a clash that is deep may be found too small."""
-        cut = self._cut(moving, standing, axis, sign, QUICK)
-        if cut is None:
+        ways = self._swept(moving, axis, sign), self._body(standing)
+        shared = ways[0] ^ ways[1]
+        cut = common(*ways, both=False, samples=QUICK, shared=shared)
+        if not cut.volume:
             return None
         finished = self.finished(moving, standing).depth
-        if cut.depth <= SURELY or finished > TOLERANCE:
-            both = [
-                self._cut(moving, standing, axis, sign, SAMPLES),
-                self._cut(standing, moving, axis, -sign, SAMPLES),
-            ]
-            depth = min(cut.depth if cut else 0.0 for cut in both)
-        else:
-            depth = cut.depth
+        depth = cut.depth
+        if depth <= SURELY or finished > TOLERANCE:
+            back = self._swept(standing, axis, -sign), self._body(moving)
+            depth = common(*ways, both=False, shared=shared).depth
+            depth = min(depth, common(*back, both=False).depth)
         return depth, self._shift(cut, moving, axis, sign)
-
-    def _cut(self, moving: int, standing: int, axis: int, sign: int, samples: int) -> Common | None:
-        """The volume that a part on its way cuts out of another; None if it is empty."""
-        swept, body = self._swept(moving, axis, sign), self._body(standing)
-        cut = common(swept, body, both=False, samples=samples)
-        return cut if cut.volume else None
 
     def _shift(self, cut: Common, moving: int, axis: int, sign: int) -> float:
         """How far the moving part has come where it meets the deepest point of a clash [m]."""

@@ -17,8 +17,9 @@ import pytest
 
 from factory.apps.planning.blocking import blocking
 from factory.apps.planning.cannot import interlocks
-from factory.apps.planning.command_line.plan import _by_label
+from factory.apps.planning.command_line.plan import SOON, _by_label
 from factory.apps.planning.interlocked import PAINTS
+from factory.apps.planning.plan import PlanOptions
 from factory.pipeline import read
 from factory.support.progress import StepBar
 from tests.apps.planning.test_plan_puzzles import CHAIN, LOADED, PEG
@@ -278,6 +279,36 @@ def test_a_signal_is_heard_at_once(
     assert (done.status, done.codes) == (130, ["Interrupted"])
     assert (tmp_path / "out" / "puzzle.pag").exists() == kept
     assert not list(tmp_path.glob("out/*.mp4"))
+
+
+def test_the_time_that_is_asked_for_has_begun_while_files_are_read(
+    planning: Planning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock, left = count(step=7.0), list[float | None]()
+
+    def sought(_: object, asked: PlanOptions) -> None:
+        left.append(asked.seconds)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("factory.apps.planning.command_line.plan.monotonic", lambda: next(clock))
+    monkeypatch.setattr("factory.apps.planning.plan.plan", sought)
+    for seconds in (10, 5):
+        planning(LOADED, "--seconds", seconds)
+    assert left == [3.0, SOON]
+
+
+def test_a_signal_is_heard_while_files_are_read(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+        raise AssertionError("the signal was not heard")
+
+    file = puzzle(tmp_path, LOADED)
+    monkeypatch.setattr("factory.apps.planning.source.placed", stop)
+    done = planning(file)
+    assert (done.status, done.codes) == (130, ["Interrupted"])
+    assert not list(tmp_path.glob("out/*"))
 
 
 def test_the_answer_does_not_wait_for_pictures(

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -37,6 +38,9 @@ STOPPING = "stopping: the best tree so far is laid out; interrupt again to stop 
 UNLAID = "not laid out: the time was over before its parts were decomposed into convex bodies"
 """How good a tree is that was not laid out."""
 
+SOON = 1e-3
+"""The least time that is left to search after files are read [s]: there is a first tree."""
+
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
 
@@ -53,7 +57,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 @click.option(
     "--seconds",
     type=SECONDS,
-    help="Time to search for a better tree [s] (default: a fixed number of candidates).",
+    help="Time to read and search for a better tree [s] (default: a fixed number of candidates).",
 )
 @click.option("--keep", multiple=True, help="Sub-tree of a PAG to keep (repeatable).")
 @click.option("--replan", is_flag=True, help="Ignore the assembly tree of a PAG.")
@@ -119,9 +123,15 @@ def plan(
     templates = all_templates(folders)
     writable_folder(output)
 
+    reading = 0.0
+
     def read_as(options: SourceOptions) -> InPlace:
+        nonlocal reading
+        begin = monotonic()
         with Waiting(f"reading {source.name}", out.silent):
-            return read_source(source, templates, options)
+            made = read_source(source, templates, options)
+        reading = monotonic() - begin
+        return made
 
     fast = None if no_screws else screws
     options = SourceOptions(unit, keep, replan, library, boxes, in_place, fast)
@@ -138,7 +148,8 @@ def plan(
         for note in placed.notes:
             say(f"  {note}")
     side = UPS[up] if up else None
-    search = PlanOptions(aim, seconds, allow, hulls, side, base or "", fast, templates=templates)
+    left = None if seconds is None else max(SOON, seconds - reading)
+    search = PlanOptions(aim, left, allow, hulls, side, base or "", fast, templates=templates)
     planned, stopped = _sought(placed, search, out)
     if isinstance(planned, CannotAssemble):
         return refuse(placed, planned, folder, look, out)
