@@ -140,7 +140,7 @@ def swept_by(scene: Scene, chain: SerialChain, way: JointWay, label: str = "") -
 
 def both_scenes(name: str) -> tuple[Scene, Scene]:
     """Two arms that face each other."""
-    off = {"six": 0.8, "scara": 0.6}[name]
+    off = {"six": 1.1, "scara": 0.6}[name]
     return (
         scene_of(Stand((0.0, -off, 0.1), 1.57, PAD_RADIUS), name=name),
         scene_of(Stand((0.0, off, 0.1), -1.57, PAD_RADIUS), name=name),
