@@ -12,7 +12,7 @@ import numpy as np
 
 from factory.api import Array, Diagnostic, Factory, Guidepath, Layout, Product, RunError
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
-from factory.apps.arms.cell import GAP, PEDESTAL_HEIGHT, Well, down, shown_height, well_of
+from factory.apps.arms.cell import GAP, PEDESTALS, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
@@ -55,11 +55,13 @@ class Arrangement:
         factory: the factory; its first robot is the carrier, all others are arms.
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
+        pedestal: height of their bases [m].
     """
 
     factory: Factory
     rails: Layout
     chain: SerialChain
+    pedestal: float = PEDESTALS[0]
 
     @property
     def product(self) -> Product:
@@ -114,7 +116,7 @@ class Arrangement:
             raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
         (x, y), off = self.station, NEAR * self.far
         return {
-            arm: Stand((x, y + side * off, PEDESTAL_HEIGHT), -side * pi / 2, self.pad)
+            arm: Stand((x, y + side * off, self.pedestal), -side * pi / 2, self.pad)
             for arm, side in zip(self.arms, SIDES, strict=False)
         }
 

@@ -30,8 +30,9 @@ FLOOR = 0.02
 BELOW = 0.005
 """Between the lowest place of a feeder's pad and the bottom of its well [m]."""
 
-PEDESTAL_HEIGHT = 0.10
-"""Height of an arm's base [m]."""
+PEDESTALS = 0.10, 0.17, 0.30
+"""Heights of an arm's base, tried in turn: an arm whose tool comes down on a slide, and one that
+places parts high up, stands higher [m]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from factory.api import (
 )
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import with_tool
-from factory.apps.arms.cell import CellChains
+from factory.apps.arms.cell import PEDESTALS, CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.planning import ArmPlanner, ArmTour
@@ -86,7 +86,19 @@ def laid_out(factory: Factory, rails: Layout, arm: Arm, pace: WayLimits) -> Layo
 
     Raises RunError: Unreachable, NoWay, Layout.
     """
-    cell = Arrangement(factory, rails, with_tool(read_chain(arm.file)))
+    chain, refusals = with_tool(read_chain(arm.file)), list[RunError]()
+    for pedestal in PEDESTALS:
+        try:
+            return _planned(Arrangement(factory, rails, chain, pedestal), arm, pace)
+        except RunError as error:
+            if error.diagnostics[0].code != "Unreachable":
+                raise
+            refusals.append(error)
+    raise refusals[0]
+
+
+def _planned(cell: Arrangement, arm: Arm, pace: WayLimits) -> Layout:
+    """The layout of what stands in a cell, with the arms' ways and its certificate."""
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm.file, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})

@@ -147,7 +147,9 @@ class ArmPlanner:
             why = diagnose_reach(self.chain, place, turn)
             if why is not None:
                 return Diagnostic("Unreachable", why.message(label, self.name), position, RAILS)
-        by = f": {self.scene.say(blocked.pair)} are in each other's way" if blocked else ""
+        by = f" and goes straight up by {self.cell.over_well * 1e3:.0f} mm at either end"
+        if blocked:
+            by = f": {self.scene.say(blocked.pair)} are in each other's way"
         message = f"{self.name} has no configuration that brings '{label}'{by}"
         return Diagnostic("Unreachable", message, position, RAILS)
 
