@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 from factory.api import Diagnostic, RunError
+from factory.apps.arms import planning
 from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
+from factory.apps.arms.legs import NoWay
 from factory.apps.arms.model import ArmModel
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -73,7 +76,7 @@ def test_a_cell_keeps_to_its_prediction(arm: str, world: str) -> None:
     assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
 
 
-@pytest.mark.parametrize("arm", ARMS)
+@pytest.mark.parametrize("arm", [*ARMS, "scara"])
 def test_a_cell_with_jitter_makes_its_units(arm: str) -> None:
     made = run(cell(arm), units=3, jitter=0.3, seed=7)
     assert made.succeeded and made.refines_net and made.products == 3
@@ -137,7 +140,7 @@ def test_options_that_no_cell_has_are_refused(
         (SUBS, "NoCell", "joins the sub-assemblies 'y', 'z'", 2),
         (TOOL, "NoCell", "'x' is made by a tool, weld", 2),
         (MIX, "NoCell", "one product, not a mix", None),
-        (column(0.4), "Unreachable", "'b'", 4),
+        (column(0.4), "Unreachable", "brings 'b' and goes straight up by 4", 4),
     ],
 )
 def test_what_a_cell_cannot_make_is_refused_where_it_is(
@@ -187,3 +190,12 @@ def test_what_a_cell_says_of_its_arms() -> None:
     for robot in layout.factory.robots[1:]:
         rows = {table.row(operation, robot.index) for operation in robot.operations}
         assert len(rows) == len(robot.operations)
+
+
+def test_where_no_way_is_found_it_says_between_what() -> None:
+    """In place of the search for ways one that finds none."""
+    with patch.object(planning, "leg", lambda *_: NoWay(0, 0.004, 9)):
+        why = refusal(SMALL)
+    assert why.code == "NoWay" and "no way from 'lid' to 'motor'" in why.message
+    assert "4.0 mm nearer" in why.message and "rails" in why.hint
+    assert why.position is not None and why.position.line == 5

@@ -82,13 +82,17 @@ def test_a_curve_moves_as_many_joints_as_it_has_dimensions() -> None:
     ways = Ways(np.array([[-FAR, FAR]] * 2), np.zeros((2, 1)), terms, np.ones(2))
     index, joints = np.array([1, 3]), np.array([[1, 4, 5], [3, 6, 7]])
     row = np.array([-1, 0, -1, 1])
-    curves = Curves(index, ways, row, joints, joints, joints[:, 1:])
+    curves = Curves(
+        index, ways, None, np.arange(2), np.zeros(2), row, joints, joints, joints[:, 1:]
+    )
     x, v = np.array([0.3, -0.2]), np.array([0.5, 0.7])
     askew = np.cross(along, [0.0, 0.0, 0.1])  # beside the lines: not seen
     for found, known in zip(
         curves.along(along * x[:, None] + askew, along * v[:, None] - askew), (x, v), strict=True
     ):
         assert found == pytest.approx(known)
+    away = ways.apart(along * x[:, None] + askew)
+    assert away == pytest.approx(np.linalg.norm(askew, axis=1))
     spread = curves.spread(np.zeros(4), np.array([[1.0, 2.0, 3.0, 4.0]]))[0]
     assert spread[[0, 2]].tolist() == [1.0, 3.0]
     assert spread[joints] == pytest.approx(along * [[2.0], [4.0]])
