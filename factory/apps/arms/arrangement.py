@@ -11,6 +11,7 @@ from math import asin, cos, pi, sin
 import numpy as np
 
 from factory.api import Array, Diagnostic, Factory, Guidepath, Layout, Product, RunError
+from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
 from factory.apps.arms.cell import GAP, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
@@ -121,7 +122,9 @@ class Arrangement:
                 f"the arm does not come from {1e3 * min(tips):.0f} to {1e3 * max(tips):.0f} mm up"
                 " with its tool down, as these parts need"
             )
-            raise RunError(Diagnostic("Unreachable", message, None, "flatter parts, another arm"))
+            raise RunError(
+                Diagnostic("Unreachable", message, None, f"flatter parts, another arm; {RAILS}")
+            )
         return ring
 
     @cached_property

@@ -121,9 +121,13 @@ def nearer(layout: Layout) -> Layout:
     return replace(made, visits=visits)
 
 
+BESIDE_IT = 3
+"""So many knots on either side of one that is moved: an arm passes them in more than a tick."""
+
+
 def bent(share: float, seen: bool) -> Changes:
-    """A knot of the way that brings 'motor', at a share of it, is moved by 0.05 rad; the monitor
-    knows of it or not."""
+    """A knot of the way that brings 'motor', at a share of it, is moved by 0.05 rad, with those
+    beside it; the monitor knows of it or not."""
 
     def change(layout: Layout) -> Layout:
         told = chains(layout)
@@ -132,7 +136,8 @@ def bent(share: float, seen: bool) -> Changes:
         legs = list(told.curves.legs)
         way = legs[row].way
         places = way.places.copy()
-        places[int(share * (len(places) - 1)), 1] += 0.05
+        knot = int(share * (len(places) - 1))
+        places[max(knot - BESIDE_IT, 0) : knot + BESIDE_IT + 1, 1] += 0.05
         moved = JointWay(way.knots, places, way.off, way.hover)
         legs[row] = replace(legs[row], way=moved)
         made = with_chains(layout, curves=LegTable(legs))
