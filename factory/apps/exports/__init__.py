@@ -2,11 +2,11 @@
 point of `factory.exporters` that defines `FORMAT`, `TAKES` and `export`.
 
 `FORMAT`: name of the format and, without `ENDING`, the ending of its files; `TAKES`: its source,
-"net" (a PAG, or a net in PNML), "pag", "log" or "factory" (a PAG or a log); `OF`: meaning of
-`--of`, where there is a choice; `RAILS`: whether all robots need guidepaths. `export(subject)`
-returns a text, bytes where `BINARY` is set, or several files by name beside the requested one,
-which has the name ""; where the subject is `whole`, the files of a folder. The docstring is the
-line in `factory export --help`.
+"net" (a PAG, or a net in PNML), "pag", "cell" (a PAG with --arm), "log" or "factory" (a PAG or a
+log); `OF`: meaning of `--of`, where there is a choice; `RAILS`: whether all robots need guidepaths.
+`export(subject)` returns a text, bytes where `BINARY` is set, or several files by name beside the
+requested one, which has the name ""; where the subject is `whole`, the files of a folder. The
+docstring is the line in `factory export --help`.
 """
 
 from __future__ import annotations
@@ -58,6 +58,7 @@ TAKEN: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "net": ("a PAG", "a net in PNML"),
         "pag": ("a PAG",),
+        "cell": ("a PAG",),
         "log": ("a log",),
         "factory": ("a PAG", "a log"),
     }

@@ -10,7 +10,7 @@ from factory.apps.exports.joints import of_arms
 from factory.apps.exports.subject import Subject
 from factory.floor.layout.exclusions import coordinated
 
-FORMAT, TAKES, ENDING, FOLDER, OF = "arm-program", "pag", "txt", True, "an arm"
+FORMAT, TAKES, ENDING, FOLDER, OF = "arm-program", "cell", "txt", True, "an arm"
 
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:

@@ -12,7 +12,7 @@ from factory.api import Layout, Pace, usage_error
 from factory.apps.arms.joint_table import joint_table
 from factory.apps.exports.subject import Subject
 
-FORMAT, TAKES, ENDING, FOLDER, OF = "joints", "pag", "csv", True, "an arm"
+FORMAT, TAKES, ENDING, FOLDER, OF = "joints", "cell", "csv", True, "an arm"
 
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
