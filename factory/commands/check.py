@@ -212,7 +212,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
     )
     words = {True: "yes", False: "NO", None: "undecided"}
     holds = {name: getattr(checked.verdict, name) for name in checked.verdict.properties}
-    say(", ".join(f"{name.replace('_', ' ')}: {words[told]}" for name, told in holds.items()))
+    say(", ".join(f"{name.replace('_', ' ')}: {words[holding]}" for name, holding in holds.items()))
     for alike in _by_property(checked.verdict.faults):
         for witness in alike if verbose else alike[:AGAINST]:
             say(f"  {witness}")

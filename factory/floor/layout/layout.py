@@ -64,7 +64,7 @@ class Layout(Keeping, Pictured):
 
     def __post_init__(self) -> None:
         for name in ("visits", "payloads"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+            object.__setattr__(self, name, MappingProxyType({**getattr(self, name)}))
 
     def __repr__(self) -> str:
         return f"<Layout of {self.factory}: {self.area:.2f} m²>"
@@ -106,8 +106,7 @@ class Layout(Keeping, Pictured):
 
     @cached_property
     def curves(self) -> tuple[tuple[int, ...], JointCurves]:
-        """The robots (index) whose first axes move several joints, and the curves in the space of
-        these: chains, or else robots whose guidepaths have bends."""
+        """The robots (index) whose first axes move several joints, and the curves of these."""
         if self.chains is not None:
             return self.chains.robots, self.chains.curves
         robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
@@ -133,8 +132,7 @@ class Layout(Keeping, Pictured):
         return (xhi - xlo) * (yhi - ylo)
 
     def goals(self, operation: int) -> tuple[float, ...]:
-        """Positions of an operation's axes at its end: arc lengths of carriages, heights of lifts
-        [m], in the order of `Factory.moves`."""
+        """Positions of an operation's axes at its end [m], in the order of `Factory.moves`."""
         return self._on_axes(operation, 1)
 
     def starts(self, operation: int) -> tuple[float, ...]:
@@ -143,12 +141,12 @@ class Layout(Keeping, Pictured):
 
     def _on_axes(self, operation: int, end: int) -> tuple[float, ...]:
         """Positions of an operation's axes at one end of its ways, 0 or 1 [m]."""
-        factory, carriages = self.factory, len(self.factory.robots)
-        visits = (
-            (axis < carriages, self.ways[operation, factory.robot_of(axis)][end])
-            for axis in factory.moves[operation]
+        factory, moves = self.factory, self.factory.moves[operation]
+        visits = [self.ways[operation, factory.robot_of(axis)][end] for axis in moves]
+        pairs = zip(moves, visits, strict=True)
+        return tuple(
+            visit.at if axis < len(factory.robots) else visit.lift for axis, visit in pairs
         )
-        return tuple(visit.at if is_carriage else visit.lift for is_carriage, visit in visits)
 
     def station(self, operation: int) -> float:
         """Arc length of an operation's station on its carrier's guidepath [m]."""
@@ -247,9 +245,9 @@ class Layout(Keeping, Pictured):
         """
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
-        chains = self.chains.robots if self.chains else ()
-        if self.chains and slot == operation.lowered and operation.robots[slot] in chains:
-            return self.chains.standoff(operation.index)
+        chains = self.chains
+        if chains and slot == operation.lowered and operation.robots[slot] in chains.robots:
+            return chains.standoff(operation.index)
         path = self.guidepaths[operation.robots[slot]]
         if slot == operation.lowered and not path.travels:
             return min(BESIDE, path.travel)

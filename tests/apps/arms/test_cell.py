@@ -140,7 +140,7 @@ def test_options_that_no_cell_has_are_refused(
         (SUBS, "NoCell", "joins the sub-assemblies 'y', 'z'", 2),
         (TOOL, "NoCell", "'x' is made by a tool, weld", 2),
         (MIX, "NoCell", "one product, not a mix", None),
-        (column(0.4), "Unreachable", "the arm does not come from", None),
+        (column(0.4), "Unreachable", "above its place", 4),
     ],
 )
 def test_what_a_cell_cannot_make_is_refused_where_it_is(
