@@ -109,9 +109,9 @@ class Layout(Keeping, Pictured):
         """The robots (index) whose first axes move several joints, and the curves of these."""
         if self.chains is not None:
             return self.chains.robots, self.chains.curves
-        robots = tuple(n for n, path in enumerate(self.guidepaths) if path.bends)
-        paths = [self.guidepaths[robot] for robot in robots]
-        return robots, Ways.of([p.bends for p in paths], [p.rounding for p in paths])
+        bent = {n: path for n, path in enumerate(self.guidepaths) if path.bends}
+        rows = [(path.bends, path.rounding) for path in bent.values()]
+        return (*bent,), Ways.of([row for row, _ in rows], [round_ for _, round_ in rows])
 
     @cached_property
     def stems(self) -> frozenset[int]:
@@ -143,9 +143,9 @@ class Layout(Keeping, Pictured):
         """Positions of an operation's axes at one end of its ways, 0 or 1 [m]."""
         factory, moves = self.factory, self.factory.moves[operation]
         visits = [self.ways[operation, factory.robot_of(axis)][end] for axis in moves]
-        pairs = zip(moves, visits, strict=True)
         return tuple(
-            visit.at if axis < len(factory.robots) else visit.lift for axis, visit in pairs
+            visit.at if axis < len(factory.robots) else visit.lift
+            for axis, visit in zip(moves, visits, strict=True)
         )
 
     def station(self, operation: int) -> float:
@@ -307,14 +307,12 @@ class Layout(Keeping, Pictured):
     @property
     def shutter_stroke(self) -> float:
         """Stroke of the shed's shutter: from above any product to the belt [m]."""
-        tall = float(self.product.high[2] - self.product.low[2])
-        return tall + PLAY + BELT_GAP + TRAY
+        return float(self.product.high[2] - self.product.low[2]) + PLAY + BELT_GAP + TRAY
 
     @cached_property
     def product_length(self) -> float:
         """Length of the finished product along the output robot's heading [m]."""
-        xlo, xhi, _, _ = self.outgoing
-        return xhi - xlo
+        return self.outgoing[1] - self.outgoing[0]
 
 
 def _grip(layout: Layout, robot: int) -> Extent | None:
