@@ -36,7 +36,8 @@ def fault(kind: str, factory: Factory, unit: int, draw: random.Random) -> Deviat
     if kind == "bad_joint":
         known = [operation for operation in known if len(operation.inputs) > 1]
     label = draw.choice(known).label
-    return Deviation(kind, label=label, unit=unit, degrees=180.0 * (kind == "misplaced"))
+    turned = {"degrees": 180.0} if kind == "misplaced" else {}
+    return Deviation(kind, label=label, unit=unit, **turned)
 
 
 def trial(product: str, kind: str, seed: int) -> Trial:
