@@ -108,7 +108,7 @@ class LaidOut:
 
 class Layouts:
     """The layouts of a source's trees. The geometry is computed once per stance: meshes are
-    decomposed into convex bodies, which are thinned, and `report` is called with how many are."""
+    decomposed into convex bodies, and `report` is called with how many are."""
 
     def __init__(
         self,
@@ -138,9 +138,7 @@ class Layouts:
         laid = self.drafted(judged)
         tree, plain = laid.tree, laid.project
         if judged.stance not in self._products:
-            product = product_geometry(
-                plain.pag, self.source.files, True, self.report, is_thinned=True
-            )
+            product = product_geometry(plain.pag, self.source.files, report=self.report)
             twin = self.source.product, judged.stance.rotation
             self._products[judged.stance] = replace(product, twin=twin)
         project = plain.with_product(self._products[judged.stance], as_drawn=True)

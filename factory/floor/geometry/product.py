@@ -41,7 +41,6 @@ from factory.floor.geometry.meshes import (
 )
 from factory.floor.geometry.overlapping import stood_in
 from factory.floor.geometry.solids import Product, Solid, from_mesh, primitive
-from factory.floor.geometry.thinning import thinned_solid
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, program, store_arrays, unpacked
 from factory.support.errors import Diagnostic, InputError
@@ -78,13 +77,12 @@ def product_geometry(
     files: Mapping[str, bytes] = MappingProxyType({}),
     decomposed: bool = True,
     report: Callable[[int, int], None] = lambda *_: None,
-    is_thinned: bool = False,
 ) -> Product:
     """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
     of the PAG. Where it is not `decomposed`, meshes that are not convex have their hulls for
-    bodies; where it `is_thinned`, convex bodies of many corners have fewer. `report` is called with
-    the number of meshes that are read, and of how many. Raises InputError if a mesh cannot be read
-    (BadMesh), or a part is too large, too far away or too heavy for the engine (BadValue)."""
+    bodies. `report` is called with the number of meshes that are read, and of how many. Raises
+    InputError if a mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy
+    for the engine (BadValue)."""
     reader = _Reader(Path(pag.folder), files, decomposed, report)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
@@ -107,8 +105,6 @@ def product_geometry(
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
     warnings = (*reader.warnings.values(), *size_warnings(pag, low, high))
-    if is_thinned:
-        solids = {label: thinned_solid(solid) for label, solid in solids.items()}
     return Product(solids, low, high, warnings)
 
 

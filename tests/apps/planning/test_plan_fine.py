@@ -15,9 +15,6 @@ from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.floor.geometry.decimation import ENOUGH, decimated
 from factory.floor.geometry.mesh_reader import read_mesh
-from factory.floor.geometry.overlap import Common, common
-from factory.floor.geometry.thinning import ENOUGH as ENOUGH_CORNERS
-from factory.floor.geometry.thinning import thinned
 from factory.pipeline import all_templates
 from tests.plan_models import MM, box
 
@@ -109,47 +106,6 @@ def test_no_part_is_decomposed_before_there_is_a_tree(
     assert "coacd" in stages, "nothing was decomposed at all"
     assert stages.index("coacd") > stages.index("searching for a tree")
     assert stages.index("coacd") > stages.index("decomposing parts into convex bodies")
-
-
-def test_overlaps_of_finished_parts_are_measured_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By the check that parts are in place, by blocking, and by what is said of the plan."""
-    measured: list[tuple[object, object]] = []
-
-    def counted(one: object, other: object) -> Common:
-        measured.append((one, other))
-        return common(one, other)
-
-    monkeypatch.setattr("factory.floor.geometry.overlap.common", counted)
-    folder = folder_of(tmp_path / "box", round_box())
-    source = read_source(folder, all_templates(), SourceOptions(unit="mm"))
-    found = plan(source)
-    assert isinstance(found, Planned) and found.project is not None
-    assert not found.project.overlaps.pairs
-    assert len(measured) == 2, "the ball and the cap in the socket"
-
-
-def test_thinned_corners_are_some_of_a_body_and_as_near_to_it_as_they_say() -> None:
-    points = np.asarray(ball(8.0).hull().to_mesh64().vert_properties)[:, :3]
-    few = thinned(points, 0.05)
-    assert len(few) < len(points) / 4
-    assert {*map(tuple, few.tolist())} <= {*map(tuple, points.tolist())}
-    assert (few.min(axis=0) == points.min(axis=0)).all()
-    assert (few.max(axis=0) == points.max(axis=0)).all()
-    normals = np.random.default_rng(0).normal(size=(500, 3))
-    reach, least = ((some @ normals.T).max(axis=0) for some in (points, few))
-    assert ((reach - least) / np.linalg.norm(normals, axis=1)).max() <= 2 * 0.05
-
-
-def test_layouts_have_thinned_bodies_and_parts_as_drawn(fine: InPlace) -> None:
-    found = plan(fine)
-    assert isinstance(found, Planned) and found.project is not None
-    for label, solid in found.project.product.solids.items():
-        drawn = fine.product.solids[label]
-        assert len(solid.corners) <= max(ENOUGH_CORNERS, len(drawn.corners) / 2)
-        assert solid.mesh is not None and drawn.mesh is not None
-        assert len(solid.mesh.faces) == len(drawn.mesh.faces) and solid.mass == drawn.mass
 
 
 @pytest.mark.parametrize("more", ["", "vn 0 0 1\n", "g body\n"])
