@@ -125,8 +125,17 @@ def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> 
     """Put the robots of an operation at their goals, with lifts down as at the start."""
     m, qpos = replica.m, replica.m.qpos0.copy()
     for robot in operation.robots:
-        slide = m.joint(names.first_axis(subject.factory.robots[robot]))
-        qpos[slide.qposadr[0]] = subject.goal(operation, robot)
+        of, goal, chains = (
+            subject.factory.robots[robot],
+            subject.goal(operation, robot),
+            subject.chains,
+        )
+        if of.body.first.moves and chains is not None:
+            row = np.array([chains.row(operation.index, robot)])
+            joints = [m.joint(joint).qposadr[0] for joint, _ in names.moved_along(of)]
+            qpos[joints] = chains.curves.at(row, np.array([goal]))[0][0]
+        else:
+            qpos[m.joint(names.first_axis(of)).qposadr[0]] = goal
     replica.place(qpos)
 
 
