@@ -26,6 +26,7 @@ from factory.floor.layout.exclusions import awaited_positions, coordinated, excl
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.presence import Presence
+from factory.floor.mating.depth import exact
 from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.support.settings import Settings
@@ -165,9 +166,9 @@ def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -
     pairs = [*nearness.near([*presences(layout, net, back)], clearance)]
     judged = [judge.nearer(pair) for pair in pairs]
     assert any(judged) and not all(judged)
-    monkeypatch.setattr(nearness, "rough", nearness.exact)
+    monkeypatch.setattr(nearness, "rough", exact)
     assert judged == [nearness.Nearness(clearance).nearer(pair) for pair in pairs]
-    monkeypatch.setattr(nearness, "exact", None)
+    monkeypatch.setattr(nearness, "spanned", None)
     again = [*presences(layout, net, back)]
     for pair in nearness.near(again, clearance):
         judge.nearer(pair)
