@@ -56,8 +56,8 @@ def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
 
 
 def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
-    """The robot (index) that does the tour of each robot of a factory: the carrier the first, tools
-    their own, and arms by turns what is placed."""
+    """The robot (index) that does the tour of each robot of a factory: the carrier its own, arms by
+    turns what is placed."""
     others = [robot.index for robot in factory.robots if robot.type != kind]
     placing = [robot for robot in factory.robots if robot.type == kind]
     order = sorted(placing, key=lambda robot: factory.postorder[robot.operations[-1]])

@@ -252,7 +252,7 @@ class Arrangement:
             bare: the layout without legs.
         """
         yield StandingBox("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
-        yield from self._carrier()
+        yield self.carrier
         for label, well in self.wells.items():
             xlo, xhi, ylo, yhi = well.feeder.housing
             yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
@@ -267,24 +267,22 @@ class Arrangement:
             ("housing", feeder.housing, feeder.low),
         ):
             yield _upright(f"the {name} of '{first}'", box, bottom, feeder.high)
-        shed = (bare.shed[0], bare.shed[1], bare.shed[2], bare.shed[3])
-        yield _upright("the outfeed's shed", shed, 0.0, self.top + 0.06)
+        yield _upright("the outfeed's shed", bare.shed, 0.0, self.top + 0.06)
         yield _upright("the outfeed", bare.outfeed, 0.0, self.top)
         for other, stand in self.stands.items():
             if other != arm:
-                x, y, z = stand.place
-                box = (x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL)
                 name = self.factory.robots[other].name
-                yield _upright(f"the base of {name}", box, 0.0, z + BASE)
+                yield _upright(f"the base of {name}", _round(stand), 0.0, stand.place[2] + BASE)
 
-    def _carrier(self) -> Iterator[StandingBox]:
+    @property
+    def carrier(self) -> StandingBox:
         """All that the carrier takes with the product on its line."""
         ends = [self.line.middle(x) for x in (self.line.reach, self.line.length)]
         low, high = sorted(end[0] for end in ends)
         side = max(float(self.half[1]), self.factory.carriage / 2)
         half, y = float(self.half[0]), ends[0][1]
         back = max(half, self.line.reach + self.factory.carriage / 2)
-        yield _upright(CARRIER, (low - back, high + half, y - side, y + side), 0.0, self.top)
+        return _upright(CARRIER, (low - back, high + half, y - side, y + side), 0.0, self.top)
 
     def _part(self, name: str, label: str, off: Array) -> Iterator[StandingBox]:
         """The boxes round the convex pieces of a part."""
@@ -300,9 +298,7 @@ class Arrangement:
         """The floor that the cell takes [m]."""
         xlo, xhi, ylo, yhi = self.rails.floor
         boxes = [well.feeder.housing for well in self.wells.values()]
-        for stand in self.stands.values():
-            x, y, _ = stand.place
-            boxes.append((x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL))
+        boxes += map(_round, self.stands.values())
         c, path = self.rails.clearance, self.rails.guidepaths[0]
         further = path.middle(path.length)[0] - self.line.middle(self.line.length)[0]
         behind = xlo - further
@@ -331,6 +327,12 @@ def feeder_name(label: str) -> str:
 def placed_name(label: str) -> str:
     """What a part in the product is called."""
     return f"'{label}' in the product"
+
+
+def _round(stand: Stand) -> Box:
+    """The square round a pedestal [m]."""
+    x, y, _ = stand.place
+    return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
 
 
 def _upright(name: str, box: Box, low: float, high: float) -> StandingBox:

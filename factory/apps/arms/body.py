@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import cos, sin
 from xml.etree.ElementTree import Element, SubElement
@@ -12,6 +11,7 @@ import numpy as np
 
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.model import ArmModel
+from factory.engine.mjcf.robots import prefixed
 
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""
@@ -26,6 +26,9 @@ PEDESTAL_MASS, STEM_MASS = 20.0, 0.08
 """What these weigh [kg]."""
 
 GRAPHITE = "0.13 0.14 0.16 1"
+
+POSE = ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis")
+"""The attributes by which MJCF gives a pose."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,16 +76,14 @@ def standing(model: ArmModel, stand: Stand, site: str = "tool") -> Element:
     if base is not body:
         base.append(body)
     world.append(base)
-    for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
+    for key in POSE:
         base.attrib.pop(key, None)
     base.set("name", "carriage")
     base.set("pos", " ".join(f"{v:.9g}" for v in stand.place))
     base.set("quat", f"{cos(stand.yaw / 2):.12g} 0 0 {sin(stand.yaw / 2):.12g}")
     base.insert(0, _cylinder("pedestal", PEDESTAL, -stand.place[2], 0.0, PEDESTAL_MASS, GRAPHITE))
-    tool = SubElement(holder, "body", {"name": "tool"})
-    for key in ("pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"):
-        if key in mount.attrib:
-            tool.set(key, mount.attrib[key])
+    pose = {key: mount.attrib[key] for key in POSE if key in mount.attrib}
+    tool = SubElement(holder, "body", {"name": "tool", **pose})
     tool.append(_cylinder("stem", SLIM * stand.pad, 0.0, STEM - PAD, STEM_MASS, "0.66 0.68 0.71 1"))
     tool.append(_cylinder("pad", stand.pad, STEM - PAD, STEM, 0.0, GRAPHITE))
     first = next(inner for inner in base.iter("body") if inner.find("joint") is not None)
@@ -148,7 +149,7 @@ def _cylinder(name: str, radius: float, low: float, high: float, mass: float, rg
 def add(root: Element, robot: str, kind: str, section: Mapping[str, Element]) -> None:
     """Put an arm, as `standing` gives it, into the sections of a model: its names begin with the
     robot's, and its classes and materials with those of its kind, which are there once."""
-    body = _prefixed(root.findall("worldbody/body")[0], kind)
+    body = prefixed(root.findall("worldbody/body")[0], kind)
     for node in body.iter():
         if "name" in node.attrib:
             node.set("name", f"{robot}/{node.get('name')}")
@@ -164,17 +165,6 @@ def add(root: Element, robot: str, kind: str, section: Mapping[str, Element]) ->
         return
     shared = SubElement(section["default"], "default", {"class": kind})
     for child in root.findall("default/*"):
-        shared.append(_prefixed(child, kind))
+        shared.append(prefixed(child, kind))
     for asset in root.findall("asset/*"):
-        named = _prefixed(asset, kind)
-        named.set("name", f"{kind}/{named.get('name')}")
-        section["asset"].append(named)
-
-
-def _prefixed(element: Element, prefix: str) -> Element:
-    copy = deepcopy(element)
-    for node in copy.iter():
-        for key in ("class", "childclass", "material", "mesh", "texture"):
-            if key in node.attrib:
-                node.set(key, f"{prefix}/{node.get(key)}")
-    return copy
+        section["asset"].append(prefixed(asset, kind, names=True))

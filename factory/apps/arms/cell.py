@@ -89,7 +89,6 @@ class CellChains:
     """
 
     factory: Factory
-    product: Product
     robots: tuple[int, ...]
     model: ArmModel
     stands: Mapping[int, Stand]

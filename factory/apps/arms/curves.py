@@ -46,6 +46,10 @@ class Leg:
         off = x - self.reach
         return self.way.length - off if self.brings else off
 
+    def on_axis(self, s: float) -> float:
+        """The coordinate of the axis at one of the way [m]."""
+        return self.reach + (self.way.length - s if self.brings else s)
+
     @property
     def sign(self) -> float:
         """Derivative of the way's coordinate by that of the axis."""
@@ -108,7 +112,7 @@ class LegTable:
             s, speed = leg.way.along(
                 places[k : k + 1], velocities[k : k + 1], leg.along(near[k : k + 1])
             )
-            x[k] = leg.reach + (leg.way.length - s[0] if leg.brings else s[0])
+            x[k] = leg.on_axis(float(s[0]))
             v[k] = leg.sign * speed[0]
         return x, v
 
@@ -146,11 +150,11 @@ class SoughtLegs:
 
     @cached_property
     def _grids(self) -> list[tuple[Array, Array]]:
-        """Configurations (legs, GRID, n) of each arm's legs, and their coordinates (legs, GRID)."""
+        """Configurations (legs, GRID, n) of each arm's legs, and where on these (GRID,) [m]."""
         grids = []
         for legs in self.legs:
             s = np.linspace(0.0, legs[0].way.length, GRID)
-            grids.append((np.stack([leg.way.at(s)[0] for leg in legs]), np.stack([s] * len(legs))))
+            grids.append((np.stack([leg.way.at(s)[0] for leg in legs]), s))
         return grids
 
     def nearest(self, places: Array) -> tuple[Array, Array]:
@@ -159,7 +163,7 @@ class SoughtLegs:
         x, first = np.empty(len(places)), np.empty_like(places)
         for arm, q in enumerate(places):
             leg, near, _ = self._nearest(arm, q)
-            x[arm] = leg.reach + (leg.way.length - near if leg.brings else near)
+            x[arm] = leg.on_axis(near)
             first[arm] = leg.at(x[arm : arm + 1])[1][0]
         return x, first
 
@@ -174,12 +178,5 @@ class SoughtLegs:
         off = np.linalg.norm(grid - q, axis=-1)
         row, at = np.unravel_index(int(off.argmin()), off.shape)
         leg = self.legs[arm][int(row)]
-        (near,), (apart,) = leg.way.nearest(q[None], s[row, at : at + 1])
+        (near,), (apart,) = leg.way.nearest(q[None], s[at : at + 1])
         return leg, float(near), float(apart)
-
-    def along(
-        self, rows: Index, places: Array, velocities: Array, near: Array
-    ) -> tuple[Array, Array]:
-        """Those coordinates [m] and the speeds (b,) along the legs [m/s]."""
-        x, first = self.nearest(places)
-        return x, (velocities * first).sum(axis=-1) / (first**2).sum(axis=-1)

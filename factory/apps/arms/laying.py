@@ -68,27 +68,27 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
     chain, several = with_tool(arm.chain), len(factory.robots) > 2
     for private in PRIVATE if several else (0.0,):
         cell = Arrangement(factory, rails, chain, private)
-        layout, in_the_way = _with_legs(cell, arm, pace)
-        if not in_the_way:
-            return layout
-    message = f"{in_the_way} are in each other's way at their feeders"
+        try:
+            return _with_legs(cell, arm, pace)
+        except InEachOthersWay as error:
+            blocked = error
+    message = f"{blocked} are in each other's way at their feeders"
     raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
 
 
-def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> tuple[Layout, str]:
-    """The layout of a cell, and the names of two arms of which one is in the other's way at its
-    feeder, "" for none."""
+class InEachOthersWay(Exception):
+    """Two arms, by their names, of which one is in the other's way at its feeder."""
+
+
+def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
+    """The layout of a cell. Raises InEachOthersWay."""
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})
     chains = _chains(cell, arm, planners, tours)
     layout = _layout(cell, chains.length, chains)
-    asked = [*_orders(cell, planners, tours)]
-    for one in asked:
-        if isinstance(one, str):
-            return layout, one
-    apart = _exclusions(layout, [one for one in asked if isinstance(one, Away)], tours)
-    return replace(layout, certificate=_certificate(cell, layout, apart)), ""
+    apart = _exclusions(layout, [*_orders(cell, planners, tours)], tours)
+    return replace(layout, certificate=_certificate(cell, layout, apart))
 
 
 def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
@@ -130,7 +130,6 @@ def _chains(
             clear[leaf] = round(t.brings.off + BEYOND, 6)
     return CellChains(
         factory,
-        cell.product,
         tuple(cell.arms),
         arm,
         cell.stands,
@@ -185,9 +184,9 @@ class Away:
 
 def _orders(
     cell: Arrangement, planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
-) -> Iterator[Away | str]:
-    """What keeps arms apart at the station, and from the carrier that leaves it; the names of two
-    arms of which one is in the other's way at its feeder."""
+) -> Iterator[Away]:
+    """What keeps arms apart at the station, and from the carrier that leaves it. Raises
+    InEachOthersWay."""
     factory = cell.factory
     of = {t.label: (arm, t) for arm, each in tours.items() for t in each}
     joins = sorted(
@@ -210,8 +209,7 @@ def _orders(
         )
         share = clear_from(planners[one].swept(goes), others)
         if share is None:
-            yield " and ".join(factory.robots[arm].name for arm in (one, other))
-            return
+            raise InEachOthersWay(" and ".join(factory.robots[arm].name for arm in (one, other)))
         yield Away(gone(before, share * goes.length), after.index, int(after is joins[0]))
     arm, tour = of[_brought(cell, joins[-1])]
     off = _next(tours[arm], tour.label).goes.off
@@ -271,10 +269,9 @@ def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certif
 def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     """The floor that machines take: the carrier's line, the arms up to their elbows, and their
     feeders."""
-    bare = [one for one in cell.obstacles(0, layout) if one.name.startswith("the carrier")]
-    for one in bare:
-        box = one.low[0], one.high[0], one.low[1], one.high[1]
-        yield Region(0, PAYLOADS, PAYLOAD_BODY, box, (0.0, one.high[2]))
+    low, high = cell.carrier.low, cell.carrier.high
+    box = low[0], high[0], low[1], high[1]
+    yield Region(0, PAYLOADS, PAYLOAD_BODY, box, (0.0, high[2]))
     for arm, stand in cell.stands.items():
         (x, y, z), half = stand.place, 0.25 * cell.ring.outer
         box = x - half, x + half, y - half, y + half

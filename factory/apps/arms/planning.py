@@ -3,7 +3,7 @@ and places them, and its ways between these."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from math import pi
@@ -216,7 +216,7 @@ class ArmPlanner:
                     way,
                     stretch,
                     bodies,
-                    partial(self._margins, label, need, spared, held),
+                    partial(scene.margins, label=label, need=need, spared=spared, held=held),
                 )
                 for stretch, spared, need, held in certified
             )
@@ -235,11 +235,6 @@ class ArmPlanner:
     def swept(self, way: JointWay, label: str = "") -> SweptArm:
         """What the arm sweeps on a way, with a part that it holds."""
         return SweptArm.of(self.scene, self.chain, way, [*self._carried(label)], label)
-
-    def _margins(
-        self, label: str, need: float, spared: Collection[str], held: bool, q: Array
-    ) -> tuple[Array, Index]:
-        return self.scene.margins(q, label, need, spared, held)
 
     def _carried(self, label: str) -> Iterator[ConvexBody]:
         """What moves with the last frame of the chain besides its links: the tool, and a part, of

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from factory.api import Array, Index, mujoco
 from factory.apps.arms.model import ArmModel
+from factory.engine.mjcf.weld_frames import joints_of
 
 NEED = 0.01
 """Clearance on transfers [m]."""
@@ -106,7 +108,7 @@ class Scene:
     def _pairs(self) -> list[tuple[int, int]]:
         """The pairs of links that may touch: those with two joints or more between them."""
         m, pairs = self.m, list[tuple[int, int]]()
-        depth = [self._depth(int(m.geom_bodyid[g])) for g in range(m.ngeom)]
+        depth = self._depth
         every, excluded = [*self.base, *self.links], {*m.exclude_signature.tolist()}
         for i, one in enumerate(every):
             for other in every[:i]:
@@ -116,12 +118,10 @@ class Scene:
                     pairs.append((one, other))
         return pairs
 
-    def _depth(self, body: int) -> int:
-        count = 0
-        while body:
-            count += int(self.m.body_jntnum[body])
-            body = int(self.m.body_parentid[body])
-        return count
+    @cached_property
+    def _depth(self) -> list[int]:
+        """Number of joints that move each geom."""
+        return [len(joints_of(self.m, int(body))) for body in self.m.geom_bodyid]
 
     def say(self, pair: int) -> str:
         """What a pair of geoms is, in words."""
@@ -184,10 +184,8 @@ class Scene:
                     best, pair = away, one * m.ngeom + other
         return float(best), int(pair)
 
-    @property
+    @cached_property
     def _far_links(self) -> list[int]:
         """The links that a payload may come to: with two joints or more between."""
-        m = self.m
-        last = max(self._depth(int(m.geom_bodyid[g])) for g in self.links)
-        near = [*self.base, *self.links]
-        return [g for g in near if self._depth(int(m.geom_bodyid[g])) <= last - 2]
+        last = max(self._depth[g] for g in self.links)
+        return [g for g in (*self.base, *self.links) if self._depth[g] <= last - 2]

@@ -58,8 +58,8 @@ class BentWays:
 
     def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Their arc lengths [m] and speeds [m/s]."""
-        every = np.arange(len(self.robots))
-        return self.ways.along(every, qpos[self.slides], qvel[self.dofs], np.zeros(len(every)))
+        x, first = self.ways.nearest(qpos[self.slides])
+        return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
     def apart(self, qpos: Array) -> Array:
         """How far robots (b,) are from their ways [m, rad]."""

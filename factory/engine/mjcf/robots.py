@@ -100,12 +100,12 @@ def load_robot_model(robot: RobotType) -> RobotModel:
     actuators = tuple(root.findall("actuator/*"))
     defaults = Element("default", {"class": robot.name})
     for child in root.findall("default/*"):
-        defaults.append(_prefixed(child, robot.name, names=False))
-    assets = tuple(_prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
+        defaults.append(prefixed(child, robot.name))
+    assets = tuple(prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
     return RobotModel(robot.name, robot.body, body, actuators, defaults, assets)
 
 
-def _prefixed(element: Element, prefix: str, names: bool) -> Element:
+def prefixed(element: Element, prefix: str, names: bool = False) -> Element:
     """A copy in which references to classes and assets are prefixed, and names too if wanted."""
     copy = deepcopy(element)
     for node in copy.iter():
@@ -163,7 +163,7 @@ def instantiate(
     axes = {each.axis.joint.joint: each for each in fitted}
     first, *_ = fitted
     robot = first.axis.robot.name
-    body = _prefixed(model.body, model.name, names=False)
+    body = prefixed(model.body, model.name)
     for node in body.iter():
         if "name" in node.attrib:
             node.set("name", f"{robot}/{node.get('name')}")

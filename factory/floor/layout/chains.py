@@ -53,11 +53,6 @@ class SoughtCurves(Protocol):
         """The coordinates (b,) of the points of the robots' curves that are nearest to places
         (b, d), and first derivatives (b, d) there."""
 
-    def along(
-        self, rows: Index, places: Array, velocities: Array, near: Array
-    ) -> tuple[Array, Array]:
-        """Those coordinates and the speeds (b,) along the curves of velocities (b, d)."""
-
     def apart(self, places: Array) -> Array:
         """Distances (b,) of places (b, d) from the robots' curves."""
 

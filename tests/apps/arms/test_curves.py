@@ -19,6 +19,7 @@ from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.scene import FAR, OWN, Scene, StandingBox
 from factory.apps.arms.sharing import SAMPLES, SweptArm, clear_from
+from factory.apps.monitor.anatomy import BentWays
 from factory.floor.layout.dimensions import PAYLOAD
 from tests.arm_cells import cell, chains
 from tests.arm_models import configurations, random_way, shipped
@@ -102,7 +103,7 @@ def test_the_force_of_a_leg_is_that_of_the_engine(load: float) -> None:
 
 def test_where_an_arm_is_on_its_legs_is_found_from_its_joints() -> None:
     sought, rng = SoughtLegs([legs()[:2], legs()[2:]]), np.random.default_rng(4)
-    length = legs()[0].way.length
+    length, every = legs()[0].way.length, np.arange(2 * sought.dimension).reshape(2, -1)
     for _ in range(30):
         rows = rng.integers(0, 2, 2)
         x = REACH + rng.uniform(0.02, 0.98, 2) * length
@@ -113,7 +114,8 @@ def test_where_an_arm_is_on_its_legs_is_found_from_its_joints() -> None:
         assert np.abs(at - x).max() < 1e-7
         v = rng.normal(size=2)
         moving = np.array([point[1][0] for point in there]) * v[:, None]
-        assert np.abs(sought.along(np.arange(2), places, moving, x)[1] - v).max() < 1e-5
+        seen = BentWays(np.arange(2), sought, every, every, every)
+        assert np.abs(seen.along(places.ravel(), moving.ravel())[1] - v).max() < 1e-5
         assert sought.apart(places).max() < 1e-7
         aside = rng.normal(size=first.shape)
         aside -= (

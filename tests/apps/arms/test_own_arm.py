@@ -119,7 +119,7 @@ def test_a_file_that_is_no_arm_is_refused(
 
 
 def test_an_arm_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    for asked in ("sex", str(tmp_path / "none.xml")):
+    for asked in ("seven", str(tmp_path / "none.xml")):
         with pytest.raises(InputError) as error:
             ArmModel.of(asked)
         (why,) = error.value.diagnostics
