@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Array, Factory, Product, Solid, mujoco
+from factory.api import Array, Factory, Product, Solid
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.apps.arms.model import ArmModel
@@ -65,7 +65,8 @@ class ToolGrip:
 
 
 def down(yaw: float) -> Array:
-    """The orientation (3, 3) of a tool that points down, turned about the vertical [rad]."""
+    """The orientation (3, 3) of a tool that points down, turned about the vertical [rad]: a half
+    turn about the horizontal axis at half of that angle."""
     c, s = cos(yaw), sin(yaw)
     return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
 
@@ -135,9 +136,7 @@ class CellChains:
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         grip = self.grips[label]
         place = grip.turn.T @ (np.asarray(centre) - grip.tip) + [0.0, 0.0, STEM]
-        quaternion = np.empty(4)
-        mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(grip.turn.T).ravel())
-        return (*place.tolist(), *quaternion.tolist())
+        return (*place.tolist(), 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

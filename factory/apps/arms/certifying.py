@@ -1,8 +1,8 @@
 """Certifies that an arm keeps clear along a whole way, not at samples alone.
 
 Between two samples at which a body is at distances a and b from something, and moves by no more
-than t in all (`growth.travels`), it is never nearer than (a + b - t) / 2. An interval in which that
-is too near is halved.
+than t in all (`travels`), it is never nearer than (a + b - t) / 2. An interval in which that
+is too near is halved (Lemma 2).
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 
 from factory.api import Array, Index
 from factory.apps.arms.chain import ConvexBody, SerialChain
-from factory.apps.arms.growth import travels
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.legs import NoWay
+from factory.apps.arms.travel import travels
 
 PIECES = 40
 """Number of equal pieces of a stretch to begin with."""

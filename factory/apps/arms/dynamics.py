@@ -1,4 +1,4 @@
-"""The scalar law of an arm on a way (Lemma 1): with x the coordinate of the way g, the torques are
+"""The scalar law of an arm on a way: with x the coordinate of the way g, the torques are
 τ = α(x) ẍ + β(x) ẋ² + γ(x), where α = M g', β = M g" + C(g, g') g', γ the weight.
 
 They are affine in (ẍ, ẋ²): limits hold for all |ẍ| <= A and |ẋ| <= V if and only if they hold in

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from factory.api import Array, Layout, Operation, Pace, names
-from factory.apps.arms.cell import CellChains
 from factory.apps.arms.joint_way import JointWay
+
+if TYPE_CHECKING:  # formats are listed where the engine is not installed, too
+    from factory.apps.arms.cell import CellChains
 
 STEP = 0.008
 """Time between two rows [s]."""
@@ -39,8 +42,7 @@ class JointLeg:
     @property
     def chains(self) -> CellChains:
         """The arms."""
-        assert isinstance(self.layout.chains, CellChains)
-        return self.layout.chains
+        return cast("CellChains", self.layout.chains)
 
     @property
     def row(self) -> int:

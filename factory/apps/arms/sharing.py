@@ -12,9 +12,9 @@ import numpy as np
 
 from factory.api import Array, mujoco
 from factory.apps.arms.chain import ConvexBody, SerialChain
-from factory.apps.arms.growth import travels
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.scene import Scene
+from factory.apps.arms.travel import travels
 
 SAMPLES = 96
 """Number of places on a way."""
