@@ -146,7 +146,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         f"{root}: {counted(robots, 'robot')}, {model.bodies} bodies of parts, "
         f"{counted(model.joints, 'joint')}, {counted(model.welds, 'weld')}",
         f"{ground}, guidepaths {layout.guidepath_length:.2f} m, "
-        f"clearance {settings.clearance * 1000:g} mm proved",
+        f"clearance {built.clearance.clearance * 1000:g} mm proved",
         f"timestep {1000 * model.settings.step:g} ms"
         + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),

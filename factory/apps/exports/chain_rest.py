@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import Layout, mujoco, names
+from factory.api import Layout, names
 from factory.floor.layout.starting import start_positions
+
+if TYPE_CHECKING:
+    from factory.api import mujoco
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,6 @@ from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.feeders import SLIDER_MASS
-from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.starting import start_positions
@@ -59,6 +58,8 @@ def written(model: Model) -> Model:
     _add_sensors(root)
     key = add(add(root, "keyframe"), "key", name="home")
     if rests := joints_at_rest(model.layout):
+        from factory.engine.mjcf.loading import load
+
         qpos, ctrl = key_values(load(_with_root(model, root)), rests)
         key.attrib.update(qpos=numbers(qpos.tolist()), ctrl=numbers(ctrl.tolist()))
     ElementTree.indent(root)

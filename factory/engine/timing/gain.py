@@ -30,13 +30,14 @@ class Figures:
 @dataclass(frozen=True, slots=True)
 class LayoutGain:
     """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
-    and the least cycle time that any layout without relays could have [s]. Where there are relays:
-    the figures without them, and how many robots they add."""
+    and the least cycle time that any layout without relays could have [s]. A layout with chains is
+    compared with none: `first` and `bound` are None. Where there are relays: the figures without
+    them, and how many robots they add."""
 
     chosen: Figures
-    first: Figures
     bottleneck: str
-    bound: float
+    first: Figures | None = None
+    bound: float | None = None
     plain: Figures | None = None
     added: int = 0
 
@@ -48,8 +49,8 @@ class LayoutGain:
         return {
             **document,
             "bottleneck": self.bottleneck,
-            "cycle_time_bound_s": round(self.bound, 6),
-            "first_feasible": asdict(self.first),
+            "cycle_time_bound_s": None if self.bound is None else round(self.bound, 6),
+            "first_feasible": None if self.first is None else asdict(self.first),
         }
 
     def __str__(self) -> str:
@@ -58,9 +59,11 @@ class LayoutGain:
             words = f"{self.added} robot{'' if self.added == 1 else 's'} more to relay"
             relays = f"; {words}, {plain.predicted_cycle_time_s:.2f} s without"
             other = " without relays"
+        cycle = f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}){relays}"
+        if first is None:
+            return cycle
         return (
-            f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}){relays};"
-            f" first feasible"
+            f"{cycle}; first feasible"
             f" layout {first.predicted_cycle_time_s:.2f} s, {first.area_m2:.2f} m²,"
             f" {first.guidepath_length_m:.2f} m; no layout{other} below"
             f" {self.bound:.2f} s"
@@ -70,15 +73,17 @@ class LayoutGain:
 def gain(layout: Layout, settings: Settings, hands: Hands, wip: int | None = None) -> LayoutGain:
     """Compare a layout with others for the same settings, `hands` to choose from, and bound on
     units inside; where robots are on tees, with a first one of robots that have no hands."""
+    cycle = _cycle(layout, settings, wip)
+    if layout.chains is not None:
+        return LayoutGain(_rounded(layout, cycle, layout.area), cycle.bottleneck)
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
     size, chosen = Clearance(c, factory.carriage), None if layout.stems else hands
     first = first_feasible(factory, product, size, (), chosen)
-    cycle = _cycle(layout, settings, wip)
     return LayoutGain(
         _figures(layout, cycle),
-        _figures(first, _cycle(first, settings, wip)),
         cycle.bottleneck,
+        _figures(first, _cycle(first, settings, wip)),
         cycle_time_bound(factory, product, c, soonest(settings)),
         _figures(plain, _cycle(plain, settings, wip)) if layout.plain else None,
         len(layout.factory.robots) - len(factory.robots),
@@ -105,5 +110,8 @@ def _cycle(layout: Layout, settings: Settings, wip: int | None) -> CycleTime:
 
 def _figures(layout: Layout, cycle: CycleTime) -> Figures:
     xlo, xhi, ylo, yhi = floor_of(layout)
-    area = (xhi - xlo) * (yhi - ylo)
+    return _rounded(layout, cycle, (xhi - xlo) * (yhi - ylo))
+
+
+def _rounded(layout: Layout, cycle: CycleTime, area: float) -> Figures:
     return Figures(round(cycle.seconds, 6), round(layout.guidepath_length, 6), round(area, 6))

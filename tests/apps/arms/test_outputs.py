@@ -247,3 +247,20 @@ def test_no_plan_log_or_recovery_of_a_cell_is_made_from_python(small: Project) -
 def test_robots_of_a_cell_can_run_their_own_programs(small: Project) -> None:
     made = Simulation(laid(small), RunRequest("mujoco", 1, distributed=True))
     assert made.run().succeeded
+
+
+def test_a_build_says_what_is_certified(small: Project, tmp_path: Path, run: Terminal) -> None:
+    """Compared with no layout on rails: that is none of a cell."""
+    file = tmp_path / "small.pag"
+    file.write_text(SMALL)
+    made = laid(small)
+    done = run("build", file, "--arm", "six", "--mjcf", tmp_path / "small.xml", "--json")
+    assert done.status == 0
+    figures = done.json["layout"]
+    assert figures["area_m2"] == pytest.approx(made.area, abs=1e-6)
+    assert figures["cycle_time_bound_s"] is None and figures["first_feasible"] is None
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "small.xml")).nu > 0
+    done = run("build", file, "--arm", "six", "--mjcf", tmp_path / "again.xml")
+    assert done.status == 0
+    assert "clearance 4 mm proved" in done.out
+    assert f"cycle {figures['predicted_cycle_time_s']:.2f} s ({figures['bottleneck']})" in done.out
