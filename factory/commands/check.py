@@ -220,7 +220,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
             name = alike[0].property.replace("_", " ")
             say(f"  not {name}: and {len(alike) - AGAINST} more (-v shows all)")
     if checked.coordinated is not None:
-        _describe_coordinated(checked.coordinated)
+        _describe_coordinated(checked.coordinated, verbose)
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
@@ -237,8 +237,9 @@ def _modes(places: Sequence[Mapping[str, str]], most: int) -> str:
     return " · ".join([*words[:most], *more])
 
 
-def _describe_coordinated(coordinated: CoordinatedNet) -> None:
-    """Print the coordinated net with its order places."""
+def _describe_coordinated(coordinated: CoordinatedNet, verbose: bool) -> None:
+    """Print the size of the coordinated net and whether it is live; its order places if asked for
+    all."""
     net = coordinated.net
     live = "NO" if coordinated.deadlock else "yes"
     say(
@@ -246,7 +247,8 @@ def _describe_coordinated(coordinated: CoordinatedNet) -> None:
         f" {len(net.net.transitions)} transitions, live: {live}"
     )
     places = zip(net.net.places, net.tokens, strict=True)
-    if rows := [(p.name, str(n)) for p, n in places if p.mode == "order"]:
+    rows = [(p.name, str(n)) for p, n in places if verbose and p.mode == "order"]
+    if rows:
         table("", ("order place", "tokens"), rows)
 
 

@@ -150,7 +150,8 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
 
 def check_project(project: Project, wip: int | None = None, laid_out: bool = False) -> Checked:
     """Check a PAG, with at most `wip` units inside at once. `laid_out`: include the coordinated
-    net, which needs a layout. Raises InputError."""
+    net, which needs a layout; it is included where only a layout tells whether the product can be
+    made. Raises InputError; RunError (Layout, Unreachable, NoWay) where there is no layout."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -166,7 +167,7 @@ def check_project(project: Project, wip: int | None = None, laid_out: bool = Fal
         project.no_grips,
         factory,
         None if project.pag.mix else least_robots(project.pag, project.templates),
-        _coordinated(project) if laid_out else None,
+        _coordinated(project) if laid_out or project.ground.reach_bound else None,
         tuple(len(one.compiled.robots) for one in project.each),
     )
 

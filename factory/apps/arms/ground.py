@@ -25,6 +25,10 @@ class CellGround(Ground):
     model: ArmModel | None = field(default=None, compare=False, repr=False)
     rails: Project | None = field(default=None, compare=False, repr=False)
 
+    @property
+    def reach_bound(self) -> bool:
+        return True
+
     def lay_out(self, factory: Factory, product: Product, settings: Settings, *_: Any) -> Layout:
         """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
         from factory.apps.arms.laying import laid_out

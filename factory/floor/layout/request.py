@@ -57,6 +57,12 @@ class Ground:
             raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
 
     @property
+    def reach_bound(self) -> bool:
+        """Whether only a layout tells whether a product can be made: robots reach so far and no
+        further. On rails they come wherever the rails lead."""
+        return False
+
+    @property
     def relays(self) -> bool:
         """Whether relays are asked for: a cycle time asks for them too."""
         return self.relay or self.cycle is not None

@@ -151,6 +151,18 @@ def test_what_a_cell_cannot_make_is_refused_where_it_is(
     assert (why.position.line if why.position else None) == line
 
 
+def test_check_lays_a_cell_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """So that it foretells what an arm cannot reach."""
+    file, run = tmp_path / "drive.pag", Terminal(capsys)
+    file.write_text(SMALL)
+    done = run("check", file, "--arm", "six", "--json")
+    assert done.status == 0 and done.json["coordinated"]["live"]
+    file.write_text(column(0.4))
+    done = run("check", file, "--arm", "six", "--json")
+    assert done.status == 1 and done.json["errors"][0]["code"] == "Unreachable"
+    assert run("check", file).status == 0
+
+
 def test_three_arms_have_no_room() -> None:
     text = SMALL.replace("root = box", "root = top; top = mate ( box, knob )")
     text += "; knob = atomic ( cylinder = (0.008, 0.012), pos = (0, 0, 0.0665) )"
