@@ -176,12 +176,15 @@ class Arrangement:
     @cached_property
     def pads(self) -> dict[str, PadPlace]:
         """Where a pad is on each part, and how large it may be there."""
-        return {label: pad_place(self.product.solids[label], (1.0, 0.0)) for label in self.arm_of}
+        solids, largest = self.product.solids, PAD_RADIUS
+        return {
+            label: pad_place(solids[label], (1.0, 0.0), largest=largest) for label in self.arm_of
+        }
 
     @cached_property
     def pad(self) -> float:
         """Radius of the pads of the arms' tools: there is room for them on every part [m]."""
-        return min(PAD_RADIUS, *(float(pad.radius) for pad in self.pads.values()))
+        return min(float(pad.radius) for pad in self.pads.values())
 
     @cached_property
     def tip(self) -> dict[str, Array]:

@@ -16,7 +16,7 @@ from factory.engine.mjcf.robots import prefixed
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""
 
-PAD_RADIUS, SLIM = 0.008, 0.75
+PAD_RADIUS, SLIM = 0.02, 0.75
 """Radius of the largest pad [m], and that of a stem as a share of its pad's."""
 
 PEDESTAL = 0.075

@@ -100,7 +100,12 @@ def scalar_law(
 
 
 def torque_share(
-    chain: SerialChain, way: JointWay, pace: WayLimits, count: int = 300, gravity: Array = GRAVITY
+    chain: SerialChain,
+    way: JointWay,
+    pace: WayLimits,
+    damping: float | Array = 0.0,
+    count: int = 300,
+    gravity: Array = GRAVITY,
 ) -> Array:
     """Greatest share (n,) of its limit that each drive needs, at equal distances along a way.
 
@@ -108,11 +113,13 @@ def torque_share(
         chain: the arm, with its payload.
         way: followed by it.
         pace: limits of the way's coordinate.
+        damping: of the joints (n,) [N m s/rad, N s/m].
         count: number of places on the way.
         gravity: in the base frame (3,) [m/s²].
     """
     g, first, second = way.at(np.linspace(0.0, way.length, count))
     alpha, beta, gamma = scalar_law(chain, g, first, second, gravity)
     push = np.abs(alpha) * pace.acceleration
-    ends = [np.abs(gamma + fast * beta) + push for fast in (0.0, pace.speed**2)]
+    drag = np.abs(damping * first) * pace.speed
+    ends = [np.abs(gamma) + push, np.abs(gamma + pace.speed**2 * beta) + push + drag]
     return np.asarray(np.max(ends, axis=(0, 1)) / chain.limits.torque)

@@ -27,6 +27,7 @@ from factory.apps.arms.body import with_tool
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
+from factory.apps.arms.load import Load
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
 from factory.apps.arms.sharing import clear_from
@@ -63,7 +64,7 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
         arm: the kind of arm.
         pace: limits of the coordinate along their ways.
 
-    Raises RunError: Unreachable, NoWay, Layout.
+    Raises RunError: Unreachable, NoWay, ArmLoad, Layout.
     """
     chain, several = with_tool(arm.chain), len(factory.robots) > 2
     for private in PRIVATE if several else (0.0,):
@@ -85,6 +86,11 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})
+    for n, planner in planners.items():
+        for t in tours[n]:
+            solid = cell.product.solids[t.label]
+            load = Load(planner.name, t.label, solid, t.grip, cell.chain, t.brings)
+            load.check(pace, planner.damping, cell.pad)
     chains = _chains(cell, arm, planners, tours)
     layout = _layout(cell, chains.length, chains)
     apart = _exclusions(layout, [*_orders(cell, planners, tours)], tours)
@@ -118,7 +124,7 @@ def _chains(
     factory, legs, rows = cell.factory, list[Leg](), dict[tuple[int, int], int]()
     standoffs, clear = dict[int, float](), dict[int, float]()
     for number, each in tours.items():
-        damping = np.array(planners[number].scene.m.dof_damping)
+        damping = planners[number].damping
         for t in each:
             solid, leaf = cell.product.solids[t.label], factory.by_label[t.label].index
             join = factory.parents[leaf]

@@ -81,6 +81,11 @@ class ArmPlanner:
             for label, geoms in self.scene.loads.items()
         }
 
+    @property
+    def damping(self) -> Array:
+        """That of the joints (n,) [N m s/rad, N s/m]."""
+        return np.array(self.scene.m.dof_damping)
+
     def tours(self) -> list[ArmTour]:
         """The tours of the arm, in the order of its program. Raises RunError (Unreachable,
         NoWay)."""

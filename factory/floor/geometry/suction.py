@@ -46,14 +46,17 @@ class PadPlace:
 
 
 def pad_place(
-    solid: Solid, heading: tuple[float, float], taken: tuple[Corner, Corner] | None = None
+    solid: Solid,
+    heading: tuple[float, float],
+    taken: tuple[Corner, Corner] | None = None,
+    largest: float = WIDEST,
 ) -> PadPlace:
     """The place of a pad on a part that leaves with a heading, a horizontal direction along an
-    axis. The pad stays out of the rectangle that is `taken`, and is smaller if necessary. Among
-    equal places the one nearest to the centre of mass is chosen; places with material under the
-    middle are preferred."""
+    axis. The pad has the `largest` radius [m], stays out of the rectangle that is `taken`, and is
+    smaller if necessary. Among equal places the one nearest to the centre of mass is chosen; places
+    with material under the middle are preferred."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
-    widest = max(min(WIDEST, SHARE * float((high - low).min())), NARROWEST)
+    widest = max(min(largest, SHARE * float((high - low).min())), NARROWEST)
     faces, drawn = Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))
     for radius in (widest, widest / 2, widest / 4):
         places = _grid(solid, radius)
