@@ -20,6 +20,7 @@ from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
+from factory.floor.layout.hands.hand import Hand
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""
@@ -137,6 +138,10 @@ class CellChains:
         grip = self.grips[label]
         place = grip.turn.T @ (np.asarray(centre) - grip.tip) + [0.0, 0.0, STEM]
         return (*place.tolist(), 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
+
+    def hand(self, label: str) -> Hand:
+        x, y, z = map(float, self.grips[label].tip)
+        return Hand("above", ((x, y, z),), next(iter(self.stands.values())).pad)
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

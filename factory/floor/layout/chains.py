@@ -11,6 +11,7 @@ from typing import Protocol
 from xml.etree.ElementTree import Element
 
 from factory.floor.layout.guidepath import Feeder
+from factory.floor.layout.hands.hand import Hand
 from factory.support.arrays import Array, Index
 
 
@@ -97,6 +98,9 @@ class Chains(Protocol):
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         """The pose (7,) of a part with this centre of mass (3,), in the product, in the body that
         holds it: its place [m] and a quaternion."""
+
+    def hand(self, label: str) -> Hand:
+        """The tool that holds a part (label), with its pad where it is on the part."""
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         """Put the body of a robot, its joints where they are at the beginning, and what its file

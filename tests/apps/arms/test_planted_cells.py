@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from factory.apps.arms.cell import CellChains
-from factory.apps.arms.curves import Leg, LegTable
+from factory.apps.arms.curves import LegTable
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.ordering import Ordering
@@ -148,21 +148,13 @@ def bent(share: float, seen: bool) -> Changes:
     return change
 
 
-@dataclass(frozen=True, eq=False)
-class Light(Leg):
-    """A leg whose drives know of half of the payload."""
-
-    def force(self, x: Any, v: Any, a: Any, load: float) -> Any:
-        return Leg.force(self, x, v, a, load / 2)
-
-
-def light(layout: Layout) -> Layout:
-    """Payloads are twice as heavy as the drives know."""
-    legs = [
-        Light(one.chain, one.way, one.reach, one.brings, one.center, one.damping)
-        for one in chains(layout).curves.legs
-    ]
-    return with_chains(layout, curves=LegTable(legs))
+def heavy(layout: Layout) -> Layout:
+    """Parts are six times as heavy as the cell knows."""
+    solids = {
+        label: replace(solid, mass=6 * solid.mass, inertia=6 * solid.inertia)
+        for label, solid in layout.product.solids.items()
+    }
+    return replace(layout, product=replace(layout.product, solids=solids))
 
 
 class Turned(CellChains):
@@ -208,7 +200,7 @@ FAULTS = (
     Fault("the last knot of a way is off", ("Dropped", "Contact"), layout=bent(1.0, True)),
     Fault("a knot near the last is off", ("Dropped", "Contact"), layout=bent(0.97, True)),
     Fault("a knot in the middle is off", ("Astray",), layout=bent(0.5, False), every_tick=True),
-    Fault("payloads are twice as heavy", (), layout=light),
+    Fault("parts are six times as heavy", ("Dropped",), layout=heavy),
     Fault("grips are off by 2°", ("Missed", "HandOffTurn"), layout=turned),
 )
 

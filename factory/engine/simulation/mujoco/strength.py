@@ -3,6 +3,7 @@
 A weld holds a body at its centre of mass. Its force and torque are equivalent to a force and a
 moment about the middle of the tips, which is what tips bear: a hand far from the centre of mass
 bears the moment of the weight too. All values belong to the start of the engine's last step.
+Carriages keep their bodies' axes along those of the world; chains turn what they hold.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from factory.engine.simulation.world import Drop
 from factory.floor.layout.hands.gauges import gauge, middle
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.tips import TERMS, shares
-from factory.support.arrays import Array, Index
+from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
 
@@ -68,21 +69,20 @@ class Strength:
     ) -> None:
         self.most: StrengthUse | None = None
         self.dropped: Drop | None = None
-        self._d, self._model = d, model
-        self._hands = {
-            robot: hand
-            for robot, hand in enumerate(model.layout.hands)
-            if hand is not None and hand.kind != "none"
-        }
-        self._robots = np.array([*self._hands], np.intp)
-        self._grips = [(grip, weld) for grip, weld in welds.items() if grip[0] in self._hands]
+        self._m, self._d, self._model = m, d, model
+        held = {grip: self._hand_on(*grip) for grip in welds}
+        self._hands = {grip: hand for grip, hand in held.items() if hand and hand.kind != "none"}
+        robots = dict.fromkeys(robot for robot, _ in self._hands)
+        self._robots = np.array(sorted(robots), np.intp)
+        self._grips = [(grip, weld) for grip, weld in welds.items() if grip in self._hands]
         # the last grip is of all welds that are no grips, and of no hand
         self._grip = np.full(m.neq, len(self._grips))
         self._grip[[weld for _, weld in self._grips]] = np.arange(len(self._grips))
+        holders = np.array([robot for (robot, _), _ in self._grips], np.intp)
+        self._hand = np.append(np.searchsorted(self._robots, holders), len(self._robots))
+        chains = model.layout.chains
+        self._turns = np.append(np.isin(holders, chains.robots if chains else ()), False)
         self._gauges = self._of_grips()
-        number = {robot: n for n, robot in enumerate(self._hands)}
-        robots = [number[robot] for (robot, _), _ in self._grips]
-        self._hand = np.array([*robots, len(self._hands)], np.intp)
         self._next, self._risen = -np.inf, float(d.time)
 
     def look(self) -> list[int]:
@@ -92,10 +92,13 @@ class Strength:
         if not self._grips or not d.ne or d.time < self._next:
             return []
         self._next = d.time + min(SELDOM, max(OFTEN, CALM * (d.time - self._risen)))
-        grips = self._grip[d.efc_id[: d.ne : ROWS]]
+        welds = d.efc_id[: d.ne : ROWS]
+        grips, force = self._grip[welds], d.efc_force[: d.ne].reshape(-1, ROWS, 1)
         # of all constraints only welds count: what else touches a body is a load
-        terms = self._gauges[grips] @ d.efc_force[: d.ne].reshape(-1, ROWS, 1)
-        loads = np.zeros((len(self._hands) + 1, TERMS))
+        if (turned := self._turns[grips]).any():
+            force = self._in_bodies(force, turned, welds)
+        terms = self._gauges[grips] @ force
+        loads = np.zeros((len(self._robots) + 1, TERMS))
         np.add.at(loads, self._hand[grips], terms[:, :, 0])
         use = shares(loads[:-1])
         share = float(use.max())
@@ -109,6 +112,21 @@ class Strength:
         weak = np.append(use > 1.0, False)[self._hand[grips]]
         return [self._grips[grip][1] for grip in grips[weak].tolist()]
 
+    def _hand_on(self, robot: int, label: str) -> Hand | None:
+        """The hand by which a robot holds a body."""
+        layout = self._model.layout
+        if layout.chains is not None and robot in layout.chains.robots:
+            return layout.chains.hand(label)
+        return layout.hand(robot)
+
+    def _in_bodies(self, force: Array, turned: Truth, welds: Index) -> Array:
+        """The rows of welds (n, 6, 1), with the forces of those that are `turned` (n,) in the
+        frames of the bodies that they hold, as the rows of rotation are."""
+        turn = self._d.xmat[self._m.eq_obj2id[welds[turned]]].reshape(-1, 3, 3)
+        force = force.copy()
+        force[turned, :3] = np.swapaxes(turn, -1, -2) @ force[turned, :3]
+        return force
+
     def _keep(self, use: Array, grips: Index) -> None:
         """Keep the largest share."""
         holding = np.unique(self._hand[grips[grips < len(self._grips)]])
@@ -121,20 +139,21 @@ class Strength:
     def _of_grips(self) -> Array:
         """For each grip the map from the rows of its weld to the terms of strength (grips + 1, 11,
         6). Position rows are the opposite of the force on the body, rotation rows twice the
-        opposite of the torque: together the load at the body's centre of mass. Bodies keep the axes
-        of the world."""
+        opposite of the torque: together the load at the body's centre of mass, in the frame of the
+        product."""
         terms = np.zeros((len(self._grips) + 1, TERMS, ROWS))
         layout = self._model.layout
         grips = {(grip.robot, grip.label): grip for grip in grips_of(layout, self._model.carried)}
         for number, (key, _) in enumerate(self._grips):
-            grip, hand = grips[key], self._hands[key[0]]
+            grip, hand = grips[key], self._hands[key]
             load = np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
-            at = grip.centre - middle(hand)
-            at[:2] += grip.visit.shift
-            tour = grip.layout.factory.turns[grip.begins, grip.robot]
-            first = grip.layout.factory.robots[grip.robot].operations[0]
-            at[2] += grip.visit.height
-            at[2] -= grip.layout.visits[first, grip.robot].height
+            at, tour = grip.centre - middle(hand), 0
+            if not self._turns[number]:
+                tour = grip.layout.factory.turns[grip.begins, grip.robot]
+                first = grip.layout.factory.robots[grip.robot].operations[0]
+                at[:2] += grip.visit.shift
+                at[2] += grip.visit.height
+                at[2] -= grip.layout.visits[first, grip.robot].height
             load[3:, :3] = np.cross(at, np.eye(3)).T
             terms[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
         return terms
@@ -153,7 +172,7 @@ class Strength:
     def _drop(self, number: int, use: StrengthUse) -> Drop:
         """The diagnostic of the n-th hand, which lets go."""
         factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
-        bears = _told(self._hands[robot])
+        bears = _told(next(hand for (one, _), hand in self._hands.items() if one == robot))
         message = (
             f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.4g} times"
             f" what its hand bears ({bears})"
