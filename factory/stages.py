@@ -245,7 +245,7 @@ def run(
         check_ideal(fuse, bool(monitor))
     will_write(maybe(log))
     project = project_of(product, settings)
-    check_run(project, asked, log is not None)
+    check_run(project, asked)
     return require(run_project(project, asked, True, maybe(log), None, monitor, progress))
 
 

@@ -41,7 +41,8 @@ beside it. Above them are the apps, then the commands."""
 
 APPS = (
     ("drawing",),
-    ("arms", "foreign_nets", "importing", "few_robots", "relay", "platen", "log", "deviations"),
+    ("arms", "foreign_nets", "importing", "few_robots", "relay", "platen", "deviations"),
+    ("log",),
     ("monitor", "recovery", "planning", "analyze", "exports"),
     ("runs", "resume", "revise"),
     ("sweep",),

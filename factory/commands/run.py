@@ -97,7 +97,7 @@ def run(
     project = options.project(out.silent)
     from factory.apps.runs.running import check_run, run_project
 
-    check_run(project, asked, log is not None)
+    check_run(project, asked)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)

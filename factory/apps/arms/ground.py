@@ -19,10 +19,14 @@ class CellGround(Ground):
 
     Attributes:
         model: the kind of its arms.
-        rails: the project of the same product on rails, from which the carrier's line is taken.
+        arms: how many there are.
+        source: the project of the product as it was given.
+        rails: that of the same product on rails, from which the carrier's line is taken.
     """
 
     model: ArmModel | None = field(default=None, compare=False, repr=False)
+    arms: int = field(default=1, compare=False, repr=False)
+    source: Project | None = field(default=None, compare=False, repr=False)
     rails: Project | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -69,13 +73,18 @@ def with_arm(project: Project, asked: str) -> Project:
     name, _, number = asked.partition("=")
     if number not in ("", "1", "2"):
         raise usage_error(f"--arm {asked}: a cell has one arm or two", f"--arm {name}=2")
-    model = ArmModel.of(name)
-    made = armed(project, model, int(number or 1))
+    return cell_of(project, ArmModel.of(name), int(number or 1))
+
+
+def cell_of(project: Project, model: ArmModel, arms: int) -> CellProject:
+    """The project in which so many arms of a kind place all parts but the first. Raises InputError
+    (NoCell) for what a cell cannot make."""
+    made = armed(project, model, arms)
     nodes = tuple(
         replace(node, operation="insert") if len(node.inputs) > 1 else node
         for node in made.pag.nodes
     )
     rails = project.with_pag(replace(project.pag, nodes=nodes))
     values = {name: getattr(made, name) for name in made.__dataclass_fields__}
-    ground = CellGround(model=model, rails=rails)
+    ground = CellGround(model=model, arms=arms, source=project, rails=rails)
     return CellProject(**{**values, "ground": ground})

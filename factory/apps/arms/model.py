@@ -53,7 +53,7 @@ class ArmModel:
         none, BadArm where it cannot be used."""
         if asked in KINDS:
             file = MODELS / f"{asked}.xml"
-            return _model(asked, file, file.read_text("utf-8"), {})
+            return arm_model(asked, file, file.read_text("utf-8"), {})
         file = Path(asked)
         if file.suffix != ".xml" or not file.is_file():
             hint = f"arms: {', '.join(KINDS)}; or the path of an MJCF file"
@@ -93,10 +93,13 @@ def _own(file: Path) -> ArmModel:
             if "name" not in mesh.attrib:
                 mesh.set("name", Path(path).stem)
             mesh.set("file", name)
+            mesh.attrib.pop("content_type", None)
+    for numeric in root.findall("custom/numeric"):
+        numeric.attrib.pop("size", None)
     if compiler is not None:
         for key in ("meshdir", "texturedir", "assetdir"):
             compiler.attrib.pop(key, None)
-    return _model(kind, file, ElementTree.tostring(root, encoding="unicode"), files)
+    return arm_model(kind, file, ElementTree.tostring(root, encoding="unicode"), files)
 
 
 @lru_cache(maxsize=8)
@@ -104,7 +107,15 @@ def _read(text: str, name: str) -> SerialChain:
     return chain_of(text, name=name)
 
 
-def _model(kind: str, file: Path, text: str, files: Mapping[str, bytes]) -> ArmModel:
+def arm_model(kind: str, file: Path, text: str, files: Mapping[str, bytes]) -> ArmModel:
+    """The arm of an MJCF as the engine writes it. Raises InputError (BadArm).
+
+    Args:
+        kind: its name, as a robot type.
+        file: where it is from.
+        text: the MJCF.
+        files: its meshes by name.
+    """
     chain = chain_of(text, name=file.name, files=files) if files else _read(text, file.name)
     m = mujoco.MjModel.from_xml_string(text, dict(files))
     return ArmModel(kind, file, text, chain, tuple(_gains(m, chain)), files)

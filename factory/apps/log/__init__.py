@@ -5,7 +5,8 @@
                              wip, numbers of the places marked at the start, settings, names of
                              robots, places and transitions, the PAG's name, text and SHA-256, its
                              plan and the templates that it uses (`record.project_table`), its
-                             layout (`layout.saved`), the data of a monitor, nq, nv
+                             layout (`layout.saved`) or, with arms, its cell (`cell_table`), the
+                             data of a monitor, nq, nv
     blocks                   see blocks.py: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)

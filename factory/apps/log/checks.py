@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from factory.api import Demand, value_of
 from factory.apps.log.blocks import Arrays
+from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import FAULTS, FIGURES, HEADER, NAMES, RESERVATIONS
@@ -30,11 +31,11 @@ class Chosen:
 
 @dataclass(frozen=True, slots=True)
 class LogHeader(ProjectTable):
-    """The header of a log. `nq`, `nv`: numbers of positions and speeds of the engine; `start`:
+    """The header of a log, with the `layout` of the run, or for robots with chains their `cell`,
+    which is laid out again. `nq`, `nv`: numbers of positions and speeds of the engine; `start`:
     numbers of the places marked at the start of the run; `faults`: the requested faults, if any;
     others as in a `RunRequest`."""
 
-    layout: LayoutTable
     nq: int
     nv: int
     versions: Mapping[str, str]
@@ -54,8 +55,12 @@ class LogHeader(ProjectTable):
     transitions: tuple[str, ...]
     faults: Mapping[str, Any] = field(default_factory=dict)
     demand: Demand | None = None
+    layout: LayoutTable | None = None
+    cell: CellTable | None = None
 
     def __post_init__(self) -> None:
+        if (self.layout is None) == (self.cell is None):
+            raise ValueError("it must have a layout or a cell")
         counts = {"nq": (self.nq, 0), "nv": (self.nv, 0), "units": (self.units, 1)}
         counts |= {"seed": (self.seed, 0), "wip": (self.wip or 1, 1)}
         for name, (count, least) in counts.items():

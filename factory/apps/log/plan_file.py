@@ -95,8 +95,9 @@ def plan_files(
     project: Project, folder: Path, text: str | None = None, laid: bool = True
 ) -> dict[Path, bytes]:
     """The two files of a project, for a folder, without the layout where it is not to be `laid`
-    out; `text`: that of its PAG where its meshes are moved beside the folder. Raises OSError where
-    a mesh cannot be read."""
+    out; `text`: that of its PAG where its meshes are moved beside the folder. Raises InputError
+    (Usage) for robots without guidepaths, OSError where a mesh cannot be read."""
+    project.compiled.check_rails("a plan (-o DIR)")
     pag, factory = project.pag, project.layout.factory if laid else project.plain
     table = project_table(pag, project.templates, factory, project.settings, text)
     if text is not None:

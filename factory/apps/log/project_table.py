@@ -7,10 +7,12 @@ not in it: they are read from the folder of the PAG, or from beside the file wit
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +32,7 @@ from factory.api import (
     value_of,
     write_pag,
 )
+from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
 from factory.floor.layout.saved import LayoutTable
 from factory.pipeline import all_templates
@@ -78,9 +81,7 @@ def project_table(
     text: str | None = None,
 ) -> dict[str, Any]:
     """The table of a factory, of the PAG and templates that it was compiled from, and of settings;
-    `text`: that of the PAG where it is not as it was read. Raises InputError (Usage) for robots
-    without guidepaths."""
-    factory.check_rails("a plan (-o DIR) or a log (--log)")
+    `text`: that of the PAG where it is not as it was read."""
     file = Path(pag.file)
     if text is None:
         written = file.is_file() and all(allowed.position for allowed in pag.allowed)
@@ -108,14 +109,35 @@ def project_of(
     ground: Ground = Ground(),  # noqa: B008 (frozen)
 ) -> Project:
     """The project in a table of a file in the folder `beside`, with its layout, if any; `settings`
-    replace those of the table. Raises InputError where its PAG cannot be read, or meshes are
-    missing, ValueError where the table is not valid."""
+    replace those of the table. Of a cell the project of its arms. Raises InputError where its PAG
+    cannot be read, or meshes are missing, ValueError where the table is not valid."""
+    if "cell" in table:
+        return _cell_of(table, beside, settings)
     made, kept = ProjectTable.of(table), table.get("layout")
     templates = _templates(made)
     pag = _pag(made.pag, templates, beside)
     laid = None if kept is None else value_of(LayoutTable, kept, "layout")
     settings = settings or made.settings
     return Project(pag, templates, load_catalogue(), settings, ground, made.plan, laid)
+
+
+def _cell_of(table: Mapping[str, Any], beside: Path, settings: Settings | None) -> Project:
+    """The project of the cell in a table: laid out once, however often it is asked for."""
+    names = [*(f.name for f in fields(ProjectTable)), "cell"]
+    text = json.dumps({name: table[name] for name in names if name in table}, sort_keys=True)
+    try:
+        project = _cell(text, Path())
+    except InputError:
+        project = _cell(text, beside)
+    return project.with_settings(settings) if settings else project
+
+
+@lru_cache(maxsize=2)
+def _cell(text: str, beside: Path) -> Project:
+    """The project of the cell in a table in JSON."""
+    table = json.loads(text)
+    cell = value_of(CellTable, table.pop("cell"), "cell")
+    return cell.project(project_of(table, beside))
 
 
 def settings_of(table: Mapping[str, Any]) -> Settings:
@@ -144,6 +166,11 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
     Raises InputError (BadLog) where its names are not those of the header, or the run's first
     marking is not one of its own.
     """
+    if "cell" in header:
+        factory = project_of(header, Path()).plain
+        check_names(factory, header)
+        firings(factory.net, frozenset(header["start"]))
+        return factory
     made, catalogue = ProjectTable.of(header), load_catalogue()
     templates = _templates(made)
     pag = read_pag(made.pag.text, templates, made.pag.file, None)

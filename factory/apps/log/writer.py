@@ -31,6 +31,7 @@ from factory.api import (
     table_of,
 )
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
+from factory.apps.log.cell_table import cell_in
 from factory.apps.log.content import content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
@@ -290,10 +291,8 @@ def _header(
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
     factory, account = layout.factory, now.account
-    pag, templates = (project.pag, project.templates) if project else (factory.pag, {})
     return {
-        **project_table(pag, templates, factory, simulation.request.settings),
-        "layout": table_of(LayoutTable.of(layout)),
+        **_project(simulation, project),
         "versions": {"python": platform.python_version(), **versions()},
         "command": list(sys.argv if command is None else command),
         "world": simulation.request.world,
@@ -317,6 +316,20 @@ def _header(
         "nq": len(now.observation.qpos),
         "nv": len(now.observation.qvel),
     }
+
+
+def _project(simulation: Recordable, project: Project | None) -> dict[str, Any]:
+    """The table of the project of a run. Raises InputError (Usage) for robots without guidepaths,
+    where it is not known how they were laid out."""
+    layout, settings = simulation.layout, simulation.request.settings
+    if layout.chains is not None and project is not None and (kept := cell_in(project)):
+        product, cell = kept
+        made = project_table(product.pag, product.templates, product.compiled, settings)
+        return {**made, "cell": table_of(cell)}
+    layout.factory.check_rails("a log without the project of its run")
+    pag, templates = (project.pag, project.templates) if project else (layout.factory.pag, {})
+    made = project_table(pag, templates, layout.factory, settings)
+    return {**made, "layout": table_of(LayoutTable.of(layout))}
 
 
 def versions() -> dict[str, str]:

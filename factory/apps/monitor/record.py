@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from factory.api import (
     value_of,
 )
 from factory.apps.log.model import model_of
-from factory.apps.log.project_table import factory_of, of_its_factory, settings_of
+from factory.apps.log.project_table import factory_of, of_its_factory, project_of, settings_of
 from factory.apps.log.reader import Ends, Log
 from factory.apps.monitor.agreement import contradictions
 from factory.apps.monitor.anatomy import Anatomy
@@ -164,6 +165,9 @@ def word_of(log: Log, factory: Factory) -> Word | None:
 @of_its_factory()
 def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
     """The subject of a log. Raises InputError (BadLog) where its header has no factory."""
-    factory, start = factory_of(header), frozenset(header["start"])
-    table = value_of(MonitorTable, header["monitor"], "monitor")
-    return table.subject(factory, settings_of(header), start, header["wip"])
+    start, table = frozenset(header["start"]), value_of(MonitorTable, header["monitor"], "monitor")
+    if "cell" in header:
+        layout = project_of(header, Path()).layout
+        subject = table.subject(layout.factory, settings_of(header), start, header["wip"])
+        return replace(subject, chains=layout.chains)
+    return table.subject(factory_of(header), settings_of(header), start, header["wip"])

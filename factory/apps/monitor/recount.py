@@ -126,8 +126,11 @@ class _Contacts:
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
         self._operations = {int(o.place): o for o in subject.factory.operations}
-        self._replica.exclude_nothing()
         self._apart = {frozenset(names.excluded(m.exclude(e).name)) for e in range(m.nexclude)}
+        bodies = np.stack([m.exclude_signature >> 16, m.exclude_signature & 0xFFFF], axis=1)
+        of_one = m.body_rootid[bodies[:, 0]] == m.body_rootid[bodies[:, 1]]
+        self._links = {*map(frozenset, bodies[of_one].tolist())}
+        self._replica.exclude_nothing()
         self._trunk, self._solid = trunks(m), Pads(m).solid
         self._code = _codes(m, subject)
         self._holds = _held(m, subject, anatomy)
@@ -184,9 +187,12 @@ class _Contacts:
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
         """Whether two geoms may touch: those of parts that are being joined or overlap in the
-        product, and those of a pad and the part it holds."""
+        product, those of a pad and the part it holds, and those of links of one arm that its model
+        leaves out of contact."""
         m = self._replica.m
         bodies = m.geom_bodyid[[a, b]].tolist()
+        if frozenset(bodies) in self._links:
+            return True
         label = [names.part_of(m.body(body).name) for body in bodies]
         if all(label):
             robots = {int(self._in[body]) - 1 for body in bodies}

@@ -203,11 +203,13 @@ class _Plan:
         return [(x, -y) for x, y in hull(flat)]
 
     def _static(self) -> None:
-        """Rails, feeders and the outfeed."""
+        """Rails, feeders, the outfeed, and what arms stand on."""
         shapes: dict[str, list[tuple[str, list[Point]]]] = {}
         for geom, points in self._rigid(0):
             name = self.m.geom(geom).name
             style = "belt" if owner(name) == "outfeed" else STANDS.get(name.rpartition("/")[2])
+            if name.endswith("/pedestal"):
+                style = f"carriage {self.stage.roles[self.robots[owner(name)]]}"
             if style:
                 shapes.setdefault(owner(name), []).append((style, self._outline(points)))
         for name, drawn in shapes.items():

@@ -207,7 +207,6 @@ def report_on(
     if isinstance(source, Path):
         recording = recording_of(source)
         return RunReport(page(recording), recording)
-    source.compiled.check_rails("a report")
     with TemporaryDirectory(prefix="factory-") as folder:
         log, layout = Path(folder) / "run.log", source.layout
         made = replace(asked, fuse=False)

@@ -24,11 +24,11 @@ Filming = Callable[[Simulation], "Recorder"]
 """Opens the film of a simulation."""
 
 
-def check_run(project: Project, asked: RunOptions, log: bool = False) -> None:
-    """Raises InputError where a run cannot be made of a project as `asked`, or have a `log`;
-    nothing is laid out for that. Files are read, but for pipes, which are read once."""
+def check_run(project: Project, asked: RunOptions) -> None:
+    """Raises InputError where a run cannot be made of a project as `asked`; nothing is laid
+    out for that. Files are read, but for pipes, which are read once."""
     asked.check(project)
-    values = {"--faults": asked.faults is not None, "--spares": asked.spares > 0, "--log": log}
+    values = {"--faults": asked.faults is not None, "--spares": asked.spares > 0}
     if options := [option for option, is_asked in values.items() if is_asked]:
         project.compiled.check_rails(*options)
     if asked.faults is not None and not asked.faults.is_fifo():

@@ -24,7 +24,6 @@ from factory.apps.exports.stock import written
 from factory.apps.exports.writing import export, exporter
 from factory.apps.log.plan_file import plan_files
 from factory.apps.recovery import recover
-from factory.apps.report.page import report_on
 from factory.engine.mjcf.loading import load
 from factory.engine.simulation.modelling import physical_model
 from factory.pipeline import read
@@ -182,7 +181,6 @@ def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.Mon
 # --- what does not go with a cell -----------------------------------------------------------------
 
 REFUSED = [
-    (("run",), ("--log", "made.log"), "--log"),
     (("run",), ("--spares", "1"), "--spares"),
     (("run",), ("--faults", "faults.toml"), "--faults"),
     (("run",), ("--faults", "faults.toml", "--spares", "1"), "--faults and --spares"),
@@ -190,7 +188,6 @@ REFUSED = [
     (("view",), ("--spares", "1", "--port", "0"), "view"),
     (("build",), ("-o", "made"), "-o DIR"),
     (("build",), ("-o", "made", "--mjcf", "made.xml"), "-o DIR"),
-    (("report",), ("-o", "made.html"), "a report"),
     (("export",), ("--format", "dxf", "-o", "made.dxf"), "format dxf"),
     (("export",), ("--format", "urdf", "-o", "made.urdf"), "format urdf"),
 ]
@@ -233,12 +230,10 @@ def test_a_table_of_joints_needs_arms(run: Terminal) -> None:
         assert done.status == 2 and "is about arms" in done.err and "--arm six" in done.err
 
 
-def test_no_plan_log_or_recovery_of_a_cell_is_made_from_python(small: Project) -> None:
+def test_no_plan_or_recovery_of_a_cell_is_made_from_python(small: Project) -> None:
     """Whoever asks: these are refused where they are made."""
     with pytest.raises(FactoryError, match=r"a plan .* cannot be combined with --arm"):
         plan_files(small, Path())
-    with pytest.raises(FactoryError, match="a report cannot be combined"):
-        report_on(small)
     made = Simulation(laid(small), RunRequest("ideal", 1, recovers=True))
     with pytest.raises(FactoryError, match=r"recovery .* cannot be combined"):
         recover(made)

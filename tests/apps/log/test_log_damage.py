@@ -154,10 +154,14 @@ def test_headers_of_other_factories(
     assert tried(bad)[0] == 2
 
 
+OPTIONAL = {"faults", "demand", "layout", "cell"}
+"""Keys that a header may lack; a layout or a cell it has."""
+
+
 def test_a_header_that_lacks_a_key(log: Path, tmp_path: Path) -> None:
     header, blocks = taken_apart(log)
     bad = tmp_path / "bad.log"
-    for key in {field.name for field in fields(LogHeader)} - {"faults", "demand"}:
+    for key in {field.name for field in fields(LogHeader)} - OPTIONAL:
         rest = {name: value for name, value in header.items() if name != key}
         assert is_refused(put_together(bad, rest, blocks), f"'{key}'")
 

@@ -64,7 +64,6 @@ def report(
     else:
         asked.check_combination()
         project = options.project(out.silent)
-        project.compiled.check_rails("a report")
         asked = replace(asked, units=units or steady_from(project.plain.period))
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)
