@@ -128,7 +128,7 @@ def test_where_an_arm_is_on_its_legs_is_found_from_its_joints() -> None:
 
 
 def scene_of(stand: Stand, boxes: tuple[StandingBox, ...] = (), name: str = "six") -> Scene:
-    half, still = np.array([0.02, 0.03, 0.015]), np.array([1.0, 0.0, 0.0, 0.0])
+    half, still = np.array([0.02, 0.03, 0.015]), np.array([0.0, 1.0, 0.0, 0.0])
     loads = {"part": [(np.array([0.0, 0.0, STEM + 0.016]), half, still)]}
     model = ArmModel.of(name)
     return Scene(model, standing(model, stand), loads, boxes)
@@ -232,6 +232,19 @@ def test_the_capsules_of_an_arm_are_no_farther_apart_than_its_bodies() -> None:
             share = np.clip((points - ends[0]) @ u / max(float(u @ u), 1e-12), 0.0, 1.0)
             off = np.linalg.norm(points - ends[0] - share[:, None] * u, axis=1)
             assert off.max() <= radius + 1e-9, scene.names[g]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_part_that_is_held_turned_is_turned(angle: float) -> None:
+    """The engine looks at the frame that a geom has got after it was compiled."""
+    scene = scene_of(Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS))
+    m, d, (load,) = scene.m, scene.d, scene.loads["part"]
+    m.geom_quat[load] = [0.0, np.cos(angle / 2), np.sin(angle / 2), 0.0]
+    mujoco.mj_kinematics(m, d)
+    tool = d.xmat[m.geom_bodyid[load]].reshape(3, 3)
+    held, turn = tool.T @ d.geom_xmat[load].reshape(3, 3), np.empty(9)
+    mujoco.mju_quat2Mat(turn, m.geom_quat[load])
+    assert np.abs(held - turn.reshape(3, 3)).max() < 1e-9
 
 
 def test_margins_are_those_of_all_pairs() -> None:
