@@ -53,11 +53,13 @@ class Arrangement:
         factory: the factory; its first robot is the carrier, all others are arms.
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
+        aside: least angle between the station and a feeder, as its arm sees them [rad].
     """
 
     factory: Factory
     rails: Layout
     chain: SerialChain
+    aside: float = 0.0
 
     @property
     def product(self) -> Product:
@@ -161,6 +163,7 @@ class Arrangement:
             pitch = asin(min(1.0, wide / radius))
             room = (self.ring.near - beside - wide) / radius
             first = pi / 2 - asin(max(-1.0, min(1.0, room)))
+            first = max(first, self.aside)
             side = number % 2
             if len(self.arms) > 1:
                 side = int(max(angles[0] + pitch, first) + pitch > FULL)

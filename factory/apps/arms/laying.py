@@ -44,6 +44,9 @@ from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
+ASIDE = 0.0, 1.2, 1.8
+"""Angles that are tried as `Arrangement.aside` [rad]."""
+
 REACH = 0.2
 """The coordinate of an arm's axis where it places [m]."""
 
@@ -62,7 +65,25 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
 
     Raises RunError: Unreachable, NoWay, Layout.
     """
-    cell = Arrangement(factory, rails, with_tool(arm.chain))
+    blocked = ""
+    for aside in ASIDE:
+        try:
+            cell = Arrangement(factory, rails, with_tool(arm.chain), aside)
+            return _with_legs(cell, arm, pace)
+        except InEachOthersWay as error:
+            blocked = blocked or str(error)
+        except RunError:
+            if not blocked:
+                raise
+    raise RunError(Diagnostic("Layout", blocked, None, "one arm: --arm NAME"))
+
+
+class InEachOthersWay(Exception):
+    """An arm is in another's way even at its feeder."""
+
+
+def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
+    """The layout of a cell. Raises InEachOthersWay."""
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = _alike({n: planner.tours() for n, planner in planners.items()})
@@ -170,8 +191,8 @@ class PrivateParts:
 def _private_parts(
     planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
 ) -> dict[str, PrivateParts]:
-    """The private parts of the ways of each part; none in a cell of one arm. Raises RunError
-    (Layout) where an arm is in another's way even at its feeder."""
+    """The private parts of the ways of each part; none in a cell of one arm. Raises
+    InEachOthersWay."""
     if len(tours) == 1:
         return {}
     comes, leaves = dict[int, list[SweptArm]](), dict[int, list[SweptArm]]()
@@ -185,8 +206,8 @@ def _private_parts(
             first = clear_share(comes[arm][n], others)
             last = clear_share(leaves[arm][n].backwards, others)
             if not first or not last:
-                message = f"{planners[arm].name} is in another's way where it takes '{t.label}'"
-                raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
+                name = planners[arm].name
+                raise InEachOthersWay(f"{name} is in another's way where it takes '{t.label}'")
             length = t.brings.length
             private[t.label] = PrivateParts(first * length, (1.0 - last) * length)
     return private
