@@ -32,6 +32,9 @@ APART = 0.02
 LANE = 0.32
 """From the station to either end of the carrier's line, without the product's length [m]."""
 
+FULL = pi - 0.1
+"""Angle from the station up to which there are feeders on either side of an arm [rad]."""
+
 ABOVE = 0.022
 """How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""
 
@@ -50,15 +53,13 @@ class Arrangement:
         factory: the factory; its first robot is the carrier, all others are arms.
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
-        private: least angle between the station and a feeder, as its arm sees them: with another
-            arm, ways nearer to the station are near those of the other for all of their length
-            [rad].
+        aside: least angle between the station and a feeder, as its arm sees them [rad].
     """
 
     factory: Factory
     rails: Layout
     chain: SerialChain
-    private: float = 0.0
+    aside: float = 0.0
 
     @property
     def product(self) -> Product:
@@ -150,8 +151,9 @@ class Arrangement:
         }
 
     def _places(self, arm: int) -> Iterator[tuple[str, tuple[float, float]]]:
-        """Where the parts of an arm are shown: on a circle round it, to the right and left of the
-        station in turn, the first ones next to the carrier's line."""
+        """Where the parts of an arm are shown: on a circle round it, the first ones next to the
+        carrier's line; to the right and left of the station in turn, but with another arm opposite
+        to the right as long as there is room: so the ways of both cross at the station alone."""
         stand, radius = self.stands[arm], self.ring.near + CLOSER
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.rails.clearance
         angles = [0.0, 0.0]
@@ -161,11 +163,13 @@ class Arrangement:
             pitch = asin(min(1.0, wide / radius))
             room = (self.ring.near - beside - wide) / radius
             first = pi / 2 - asin(max(-1.0, min(1.0, room)))
-            first = max(first, self.private)
+            first = max(first, self.aside)
             side = number % 2
+            if len(self.arms) > 1:
+                side = int(max(angles[0] + pitch, first) + pitch > FULL)
             angle = max(angles[side] + pitch, first)
             angles[side] = angle + pitch
-            if angles[side] > pi - 0.1:
+            if angles[side] > FULL:
                 message = f"the feeder of '{label}' has no room round its arm"
                 hint = "more arms, smaller parts, or rails: leave out --arm"
                 raise RunError(Diagnostic("Layout", message, None, hint))

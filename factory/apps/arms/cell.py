@@ -7,7 +7,7 @@ which it rises from below, and lowers it onto what the carrier brings.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import cos, hypot, sin
 from xml.etree.ElementTree import Element
@@ -86,6 +86,8 @@ class CellChains:
         curves: the legs.
         rows: by operation and robot, the leg.
         standoffs: by operation, how far short of its place an arm waits [m].
+        private: by operation before which an arm waits nearer to its place than its feeder, how far
+            short of that place [m].
         clear: by operation that takes a part, how far it goes until that part's feeder is
             clear [m].
     """
@@ -100,6 +102,7 @@ class CellChains:
     rows: Mapping[tuple[int, int], int]
     standoffs: Mapping[int, float]
     clear: Mapping[int, float]
+    private: Mapping[int, float] = field(default_factory=dict)
     timestep: float = 0.002
 
     @property
@@ -133,6 +136,9 @@ class CellChains:
 
     def standoff(self, operation: int) -> float:
         return self.standoffs[operation]
+
+    def waits(self, operation: int) -> float | None:
+        return self.private.get(operation)
 
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         grip = self.grips[label]

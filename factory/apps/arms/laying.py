@@ -2,14 +2,14 @@
 
 What stands, and all that the carrier may take, is clear of the arms' transfers; what an arm does
 nearer to the station is kept apart by standoffs, and by order places after passes: an arm has gone
-before the carrier leaves (Theorem 19), and before another arm comes (Theorem 20).
+before the carrier leaves (Theorem 19), and before another arm comes from where it waits with its
+part, clear of all others (Theorem 20).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import radians
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.load import Load
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
-from factory.apps.arms.sharing import clear_from
+from factory.apps.arms.sharing import SweptArm, clear_share
 from factory.floor.layout.certificate import (
     ARM_BODY,
     PAYLOAD_BODY,
@@ -45,8 +45,8 @@ from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
-PRIVATE = tuple(map(radians, (72.0, 84.0, 96.0)))
-"""Angles that are tried as `Arrangement.private` where there are several arms [rad]."""
+ASIDE = 0.0, 1.2, 1.8
+"""Angles that are tried as `Arrangement.aside` [rad]."""
 
 REACH = 0.2
 """The coordinate of an arm's axis where it places [m]."""
@@ -66,19 +66,21 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
 
     Raises RunError: Unreachable, NoWay, ArmLoad, Layout.
     """
-    chain, several = with_tool(arm.chain), len(factory.robots) > 2
-    for private in PRIVATE if several else (0.0,):
-        cell = Arrangement(factory, rails, chain, private)
+    blocked = ""
+    for aside in ASIDE:
         try:
+            cell = Arrangement(factory, rails, with_tool(arm.chain), aside)
             return _with_legs(cell, arm, pace)
         except InEachOthersWay as error:
-            blocked = error
-    message = f"{blocked} are in each other's way at their feeders"
-    raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
+            blocked = blocked or str(error)
+        except RunError:
+            if not blocked:
+                raise
+    raise RunError(Diagnostic("Layout", blocked, None, "one arm: --arm NAME"))
 
 
 class InEachOthersWay(Exception):
-    """Two arms, by their names, of which one is in the other's way at its feeder."""
+    """An arm is in another's way even at its feeder."""
 
 
 def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
@@ -91,9 +93,10 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
             solid = cell.product.solids[t.label]
             load = Load(planner.name, t.label, solid, t.grip, cell.chain, t.brings)
             load.check(pace, planner.damping, cell.pad)
-    chains = _chains(cell, arm, planners, tours)
+    private = _private_parts(planners, tours)
+    chains = _chains(cell, arm, planners, tours, private)
     layout = _layout(cell, chains.length, chains)
-    apart = _exclusions(layout, [*_orders(cell, planners, tours)], tours)
+    apart = _exclusions(layout, [*_orders(cell, tours, private)], tours)
     return replace(layout, certificate=_certificate(cell, layout, apart))
 
 
@@ -119,10 +122,11 @@ def _chains(
     arm: ArmModel,
     planners: Mapping[int, ArmPlanner],
     tours: Mapping[int, Sequence[ArmTour]],
+    private: Mapping[str, PrivateParts],
 ) -> CellChains:
     """What the cell says of its arms."""
     factory, legs, rows = cell.factory, list[Leg](), dict[tuple[int, int], int]()
-    standoffs, clear = dict[int, float](), dict[int, float]()
+    standoffs, clear, waits = dict[int, float](), dict[int, float](), dict[int, float]()
     for number, each in tours.items():
         damping = planners[number].damping
         for t in each:
@@ -134,6 +138,9 @@ def _chains(
             legs.append(Leg(cell.chain, t.brings, REACH, True, center, damping))
             standoffs[join] = round(t.brings.length - t.brings.hover + BEYOND, 6)
             clear[leaf] = round(t.brings.off + BEYOND, 6)
+            if private:
+                short = t.brings.length - private[t.label].comes + BEYOND
+                waits[join] = max(standoffs[join], round(short, 6))
     return CellChains(
         factory,
         tuple(cell.arms),
@@ -145,6 +152,7 @@ def _chains(
         rows,
         standoffs,
         clear,
+        waits,
     )
 
 
@@ -174,6 +182,44 @@ def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) 
 
 
 @dataclass(frozen=True, slots=True)
+class PrivateParts:
+    """On which parts of its ways an arm is clear of all ways of all other arms.
+
+    Attributes:
+        comes: as far on its way with a part [m].
+        leaves: from there on its way from where it has placed that part [m].
+    """
+
+    comes: float
+    leaves: float
+
+
+def _private_parts(
+    planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
+) -> dict[str, PrivateParts]:
+    """The private parts of the ways of each part; none in a cell of one arm. Raises
+    InEachOthersWay."""
+    if len(tours) == 1:
+        return {}
+    comes, leaves = dict[int, list[SweptArm]](), dict[int, list[SweptArm]]()
+    for arm, each in tours.items():
+        comes[arm] = [planners[arm].swept(t.brings, t.label) for t in each]
+        leaves[arm] = [planners[arm].swept(_next(each, t.label).goes) for t in each]
+    private = dict[str, PrivateParts]()
+    for arm, each in tours.items():
+        others = [way for one in tours if one != arm for way in (*comes[one], *leaves[one])]
+        for n, t in enumerate(each):
+            first = clear_share(comes[arm][n], others)
+            last = clear_share(leaves[arm][n].backwards, others)
+            if not first or not last:
+                name = planners[arm].name
+                raise InEachOthersWay(f"{name} is in another's way where it takes '{t.label}'")
+            length = t.brings.length
+            private[t.label] = PrivateParts(first * length, (1.0 - last) * length)
+    return private
+
+
+@dataclass(frozen=True, slots=True)
 class Away:
     """An order: an operation starts when an arm has gone from where it placed a part.
 
@@ -189,10 +235,9 @@ class Away:
 
 
 def _orders(
-    cell: Arrangement, planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
+    cell: Arrangement, tours: Mapping[int, Sequence[ArmTour]], private: Mapping[str, PrivateParts]
 ) -> Iterator[Away]:
-    """What keeps arms apart at the station, and from the carrier that leaves it. Raises
-    InEachOthersWay."""
+    """What keeps arms apart at the station, and from the carrier that leaves it."""
     factory = cell.factory
     of = {t.label: (arm, t) for arm, each in tours.items() for t in each}
     joins = sorted(
@@ -205,18 +250,10 @@ def _orders(
         return Past(join.end, carriage_axis(RobotId(arm)), round(REACH + at + BEYOND, 6))
 
     for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
-        (one, left), (other, comes) = (of[_brought(cell, o)] for o in (before, after))
-        if one == other:
-            continue
-        goes, then = _next(tours[one], left.label).goes, _next(tours[other], comes.label).goes
-        others = (
-            planners[other].swept(comes.brings, comes.label),
-            planners[other].swept(then),
-        )
-        share = clear_from(planners[one].swept(goes), others)
-        if share is None:
-            raise InEachOthersWay(" and ".join(factory.robots[arm].name for arm in (one, other)))
-        yield Away(gone(before, share * goes.length), after.index, int(after is joins[0]))
+        (one, left), (other, _) = (of[_brought(cell, o)] for o in (before, after))
+        if one != other:
+            past = gone(before, private[left.label].leaves)
+            yield Away(past, after.index, int(after is joins[0]))
     arm, tour = of[_brought(cell, joins[-1])]
     off = _next(tours[arm], tour.label).goes.off
     yield Away(gone(joins[-1], off), factory.dropoff.index, 0)

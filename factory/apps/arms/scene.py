@@ -93,6 +93,7 @@ class Scene:
             if name.startswith("load/"):
                 self.loads.setdefault(name.split("/")[1], []).append(g)
         held = {g for each in self.loads.values() for g in each}
+        m.geom_sameframe[[*held]] = 0  # held turned, they have frames of their own
         self.links = [
             g
             for g in range(m.ngeom)

@@ -95,6 +95,10 @@ class Chains(Protocol):
         """How far short of its place a robot waits with what it brings to an operation (index)
         until the carrier stands [m]."""
 
+    def waits(self, operation: int) -> float | None:
+        """How far short of its place a robot goes by itself with what it brings, and waits until an
+        operation (index) starts [m]; None where it waits where it took it."""
+
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         """The pose (7,) of a part with this centre of mass (3,), in the product, in the body that
         holds it: its place [m] and a quaternion."""

@@ -29,6 +29,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.nearness import Near, near
 from factory.floor.layout.presence import Presence
+from factory.floor.layout.staying import carried_ahead
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, overlap, times
@@ -70,8 +71,10 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
 
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
-    """The operations (index) before which robots always go to where they are awaited."""
-    return [(tour[0], r) for r in awaited_positions(layout) for tour in layout.factory.tours[r]]
+    """The operations (index) before which robots always go ahead: to where they are awaited, or
+    with what they bring."""
+    homes = [(tour[0], r) for r in awaited_positions(layout) for tour in layout.factory.tours[r]]
+    return [*homes, *carried_ahead(layout)]
 
 
 def too_near(layout: Layout, robots: Collection[int]) -> set[int]:

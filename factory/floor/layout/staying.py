@@ -81,7 +81,7 @@ class Staying:
     def __init__(self, layout: Layout, net: Coordinated, awaited: Mapping[int, float]) -> None:
         self.layout, self.net, self._awaited = layout, net, awaited
         self._own = [layout.kept(_own, robot.index) for robot in layout.factory.robots]
-        self.partners = _partners(layout)
+        self.partners, self._carried = _partners(layout), carried_ahead(layout)
 
     def presences(self) -> Iterator[Presence]:
         """All presences, robot by robot."""
@@ -200,6 +200,8 @@ class Staying:
         layout, (_, number, _) = self.layout, self._steps(robot, step)
         operation = layout.factory.operations[number]
         since, visit = layout.ways[number, robot]
+        if (number, robot) in self._carried:
+            return visit.at + self._carried[number, robot]
         if robot not in self._awaited or operation.before[operation.robots.index(robot)] != NOPART:
             return since.at
         return self._awaited[robot] if goes_home(layout, robot, number) else visit.at
@@ -237,6 +239,18 @@ def goes_home(layout: Layout, robot: int, operation: int) -> bool:
     takes a part there, or its hand is tall."""
     hand = layout.hand(robot)
     return not layout.factory.operations[operation].inputs or (hand is not None and hand.tall)
+
+
+def carried_ahead(layout: Layout) -> dict[tuple[int, int], float]:
+    """For robots that go ahead of an operation with what they bring, by operation and robot
+    (index), how far short of their places there they wait [m]."""
+    chains, ahead = layout.chains, dict[tuple[int, int], float]()
+    for operation in layout.factory.operations if chains else ():
+        for robot, label in zip(operation.robots, operation.before, strict=True):
+            if chains and robot in chains.robots and label != NOPART:
+                short = chains.waits(operation.index)
+                ahead |= {} if short is None else {(operation.index, robot): short}
+    return ahead
 
 
 def comes_last(layout: Layout, robot: int, operation: int) -> bool:

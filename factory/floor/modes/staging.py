@@ -1,4 +1,5 @@
-"""Staging: a robot that waits empty-handed for others goes ahead to where they need it.
+"""Staging: a robot that waits empty-handed for others goes ahead to where they need it; one that
+moves several joints goes ahead with its part too, as far as its way is its own.
 
 The paper's `wait` stands still. Here its field may be that of the operation to come, as far as it
 moves this robot; its goal is still everything, so the net is the same, and is proved as before. The
@@ -17,7 +18,7 @@ import numpy as np
 from factory.floor.layout.exclusions import awaited_positions, too_near
 from factory.floor.layout.hands.limbs import rises_first
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.staying import goes_home
+from factory.floor.layout.staying import carried_ahead, goes_home
 from factory.floor.modes.modes import operation_starts
 from factory.support.arrays import Array
 from factory.support.settings import Settings
@@ -63,10 +64,12 @@ class HeadStart:
 
 def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     """Every way that a robot can go ahead: it brings nothing and has others to wait for, and none
-    of them comes near it on its way, whatever their speeds. A lift that holds from above rises
-    before its robot goes home."""
+    of them comes near it on its way, whatever their speeds; or it is known to be clear of them with
+    what it brings (`carried_ahead`). A lift that holds from above rises before its robot goes
+    home."""
     starts_ahead: list[HeadStart] = []
     starts, awaited = operation_starts(layout), awaited_positions(layout)
+    carried = carried_ahead(layout)
     for operation, mode, start in zip(layout.factory.operations, modes, starts, strict=True):
         homes = start.copy()
         homes[: len(operation.robots)] = [layout.home(r, operation.index) for r in operation.robots]
@@ -83,6 +86,8 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                 # others may be where a tall hand comes home to, and a part before a hand above it
                 empty = operation.awaits_empty(slot) or not operation.inputs
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
+            if (operation.index, robot) in carried:
+                ahead, goal = True, float(mode.goals[slot]) + carried[operation.index, robot]
             if ahead and abs(float(start[slot]) - goal) > ROUNDING:
                 at = float(start[slot])
                 starts_ahead.append(

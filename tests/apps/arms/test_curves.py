@@ -18,7 +18,7 @@ from factory.apps.arms.curves import Leg, LegTable, SoughtLegs
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.scene import FAR, OWN, Scene, StandingBox
-from factory.apps.arms.sharing import SAMPLES, SweptArm, clear_from
+from factory.apps.arms.sharing import BETWEEN, STEPS, SweptArm, clear_share
 from factory.apps.monitor.anatomy import BentWays
 from factory.floor.layout.dimensions import PAYLOAD
 from tests.arm_cells import cell, chains
@@ -128,7 +128,7 @@ def test_where_an_arm_is_on_its_legs_is_found_from_its_joints() -> None:
 
 
 def scene_of(stand: Stand, boxes: tuple[StandingBox, ...] = (), name: str = "six") -> Scene:
-    half, still = np.array([0.02, 0.03, 0.015]), np.array([1.0, 0.0, 0.0, 0.0])
+    half, still = np.array([0.02, 0.03, 0.015]), np.array([0.0, 1.0, 0.0, 0.0])
     loads = {"part": [(np.array([0.0, 0.0, STEM + 0.016]), half, still)]}
     model = ArmModel.of(name)
     return Scene(model, standing(model, stand), loads, boxes)
@@ -142,7 +142,7 @@ def swept_by(scene: Scene, chain: SerialChain, way: JointWay, label: str = "") -
 
 def both_scenes(name: str) -> tuple[Scene, Scene]:
     """Two arms that face each other."""
-    off = {"six": 1.1, "scara": 0.6}[name]
+    off = {"six": 0.7, "scara": 0.5}[name]
     return (
         scene_of(Stand((0.0, -off, 0.1), 1.57, PAD_RADIUS), name=name),
         scene_of(Stand((0.0, off, 0.1), -1.57, PAD_RADIUS), name=name),
@@ -184,26 +184,26 @@ def quaternion(turn: Array) -> Array:
 
 @pytest.mark.parametrize("name", ["six", "scara"])
 def test_an_arm_is_not_said_to_be_clear_of_another_that_it_is_near(name: str) -> None:
-    """On random pairs of ways: from the share on, the engine finds them apart at all samples; the
-    last sample before may be near."""
+    """On random pairs of ways: up to the share from either end, the engine finds them apart."""
     one, other = both_scenes(name)
     chain, shares = shipped(name), list[float]()
     for seed in range(6):
         ways = random_way(chain, 2 * seed, 0.5), random_way(chain, 2 * seed + 1, 0.5)
         label = "part" * (seed % 2)
         others = [swept_by(other, chain, ways[1], label)]
-        share = clear_from(swept_by(one, chain, ways[0]), others)
+        swept = swept_by(one, chain, ways[0])
+        first, last = clear_share(swept, others), 1.0 - clear_share(swept.backwards, others)
+        shares += [first, 1.0 - last]
         rng = np.random.default_rng(seed)
-        if share is None or share == 1.0:
-            continue
-        shares.append(share)
-        for s, t in rng.uniform([share, 0.0], 1.0, (60, 2)).tolist():
-            p, q = (
-                way.at(np.array([at * way.length]))[0][0]
-                for way, at in zip(ways, (s, t), strict=True)
-            )
-            assert distance(one, other, p, q, ("", label)) > 0.0, (seed, s, t)
-    assert shares
+        parts = (0.0, first), (last, 1.0)
+        for begin, end in (part for part in parts if part[0] < part[1]):
+            for s, t in rng.uniform([begin, 0.0], [end, 1.0], (30, 2)).tolist():
+                p, q = (
+                    way.at(np.array([at * way.length]))[0][0]
+                    for way, at in zip(ways, (s, t), strict=True)
+                )
+                assert distance(one, other, p, q, ("", label)) > BETWEEN - 1e-6, (seed, s, t)
+    assert any(0.0 < share < 1.0 for share in shares)
 
 
 def test_the_capsules_of_an_arm_are_no_farther_apart_than_its_bodies() -> None:
@@ -212,9 +212,9 @@ def test_the_capsules_of_an_arm_are_no_farther_apart_than_its_bodies() -> None:
     way = random_way(shipped("six"), 5)
     swept = swept_by(scene, shipped("six"), way, "part")
     geoms = [*scene.links, *scene.loads["part"]]
-    q = way.at(np.linspace(0.0, way.length, SAMPLES))[0]
+    q = way.at(np.linspace(0.0, way.length, STEPS + 1))[0]
     rng = np.random.default_rng(6)
-    for row in range(0, SAMPLES, 9):
+    for row in range(0, STEPS + 1, 93):
         scene.d.qpos[:] = q[row]
         mujoco.mj_kinematics(scene.m, scene.d)
         for ends, radius, g in zip(swept.ends[row], swept.radius, geoms, strict=True):
@@ -232,6 +232,19 @@ def test_the_capsules_of_an_arm_are_no_farther_apart_than_its_bodies() -> None:
             share = np.clip((points - ends[0]) @ u / max(float(u @ u), 1e-12), 0.0, 1.0)
             off = np.linalg.norm(points - ends[0] - share[:, None] * u, axis=1)
             assert off.max() <= radius + 1e-9, scene.names[g]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_a_part_that_is_held_turned_is_turned(angle: float) -> None:
+    """The engine looks at the frame that a geom has got after it was compiled."""
+    scene = scene_of(Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS))
+    m, d, (load,) = scene.m, scene.d, scene.loads["part"]
+    m.geom_quat[load] = [0.0, np.cos(angle / 2), np.sin(angle / 2), 0.0]
+    mujoco.mj_kinematics(m, d)
+    tool = d.xmat[m.geom_bodyid[load]].reshape(3, 3)
+    held, turn = tool.T @ d.geom_xmat[load].reshape(3, 3), np.empty(9)
+    mujoco.mju_quat2Mat(turn, m.geom_quat[load])
+    assert np.abs(held - turn.reshape(3, 3)).max() < 1e-9
 
 
 def test_margins_are_those_of_all_pairs() -> None:

@@ -121,6 +121,11 @@ def nearer(layout: Layout) -> Layout:
     return replace(made, visits=visits)
 
 
+def too_near(layout: Layout) -> Layout:
+    """Arms wait for each other where they wait for the carrier."""
+    return with_chains(layout, private=chains(layout).standoffs)
+
+
 BESIDE_IT = 3
 """So many knots on either side of one that is moved: an arm passes them in more than a tick."""
 
@@ -187,6 +192,13 @@ FAULTS = (
         "an arm is slow, no order places",
         ("Contact",),
         acts=without_orders,
+        arm="six=2",
+        patches=slow(1, 0.2),
+    ),
+    Fault(
+        "an arm is slow, the other waits above the station",
+        ("Contact",),
+        layout=too_near,
         arm="six=2",
         patches=slow(1, 0.2),
     ),
