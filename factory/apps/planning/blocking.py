@@ -220,6 +220,17 @@ def _reached(ways: Sequence[Sequence[int]], first: int, among: Collection[int]) 
     return reached
 
 
+def closure(relation: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The reflexive and transitive closure of a relation (n, n): the units that must leave with
+    each unit, if the relation has those that lock it."""
+    reach = (relation | np.eye(len(relation), dtype=bool)).astype(np.float32)
+    while True:
+        further = (reach @ reach > 0).astype(np.float32)
+        if np.array_equal(further, reach):
+            return np.asarray(reach > 0)
+        reach = further
+
+
 def blocking(source: InPlace) -> Blocking:
     """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
     many lie behind one another."""
