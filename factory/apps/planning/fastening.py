@@ -264,9 +264,9 @@ def fastened(
     graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float, drivers: Drivers
 ) -> tuple[Judged, tuple[int, ...]]:
     """A tree of all other units with the screws in it, and their nuts, and those of both for which
-    there is no place. They come last where that takes no longer, and no more relays."""
+    there is no place. They come last where that takes no longer, and costs no more."""
     early, late = (_fastened(graphs, judged, threads, dwell, drivers, n) for n in (False, True))
-    no_worse = len(late[1]) <= len(early[1]) and late[0].relays <= early[0].relays
+    no_worse = len(late[1]) <= len(early[1]) and late[0].price <= early[0].price
     return late if no_worse and late[0].seconds <= EQUAL * early[0].seconds else early
 
 
