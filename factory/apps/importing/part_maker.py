@@ -25,6 +25,9 @@ CLEAN, NOISE = 0.1, 1e-6
 """A clean rotation is by multiples of so many degrees about the axes; one that differs from it by
 no more than such an angle [rad] is that rotation."""
 
+EXACT = 1e-8
+"""A place that is so near a whole micrometre is there [m]."""
+
 UNTURNED = (1.0, 0.0, 0.0, 0.0)
 """The quaternion of no rotation."""
 
@@ -53,13 +56,20 @@ class Placement:
         if self.moved:
             whole = self.inside(values)
             turn = quaternion(whole.turn)
-            values = {"pos": rounded(whole.at)} | ({} if turn == UNTURNED else {"quat": turn})
+            values = {"pos": place(whole.at)} | ({} if turn == UNTURNED else {"quat": turn})
         return [Parameter(name, values[name]) for name in ("pos", "quat") if name in values]
 
 
 def rounded(numbers: Array) -> tuple[float, ...]:
     """Numbers rounded to nine decimals: to a nanometre."""
     return tuple(float(x) for x in np.round(numbers, 9) + 0.0)
+
+
+def place(numbers: Array) -> tuple[float, ...]:
+    """A place [m] to a nanometre, or to a whole micrometre where it is within EXACT of that: the
+    numbers of an STL file have seven digits."""
+    whole = np.round(numbers, 6)
+    return rounded(np.where(np.abs(numbers - whole) <= EXACT, whole, numbers))
 
 
 def quaternion(turn: Array) -> tuple[float, ...]:

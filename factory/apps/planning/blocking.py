@@ -45,6 +45,10 @@ CONTACT = 5e-5
 """Parts no further apart than this [m] touch. If the product is then not connected, the nearest
 parts of its components touch as well."""
 
+GUIDED = 4
+"""Of two units that are near each other one is in a hole of the other, and touches it whatever its
+play, if it cannot leave past it in so many of the six directions."""
+
 WIDER = 2.0
 """The growth factor of the gap by which components are connected."""
 
@@ -220,6 +224,17 @@ def _reached(ways: Sequence[Sequence[int]], first: int, among: Collection[int]) 
     return reached
 
 
+def closure(relation: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The reflexive and transitive closure of a relation (n, n): the units that must leave with
+    each unit, if the relation has those that lock it."""
+    reach = (relation | np.eye(len(relation), dtype=bool)).astype(np.float32)
+    while True:
+        further = (reach @ reach > 0).astype(np.float32)
+        if np.array_equal(further, reach):
+            return np.asarray(reach > 0)
+        reach = further
+
+
 def blocking(source: InPlace) -> Blocking:
     """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
     many lie behind one another."""
@@ -238,6 +253,8 @@ def blocking(source: InPlace) -> Blocking:
     near = touch | _within(finder, unit, count, NEAR)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
     locks, pressed = levels >= LOCKED, np.zeros((count, count), bool)
+    ways = locks.sum(axis=0) + locks.sum(axis=0).T
+    touch |= near & (ways >= GUIDED)
     drawn_in = overlaps.depths.finished > TOLERANCE
     pressed[unit[overlaps.one[drawn_in]], unit[overlaps.other[drawn_in]]] = True
     graphs = Blocking(labels, levels, locks, touch, *bounds, depths, hidden)

@@ -85,7 +85,10 @@ class Fastening:
         needed = {unit for thread in threads for unit in thread.clamps}
         late = self.late and all(thread.into < 0 for thread in threads)
         screws = [thread.screw for thread in threads]
-        return self._joined(screws, needed, self.driven, (self.up.up,), late)
+        return any(
+            self._joined(screws, needed, self.driven, (self.up.up,), late, passed)
+            for passed in (False, True)
+        )
 
     def put_on(self, ring: int, screw: int, near: Sequence[int]) -> bool:
         """Put a nut or a washer on a screw, from above or from below, in the smallest sub-assembly
@@ -100,13 +103,17 @@ class Fastening:
         at: dict[tuple[int, ...], list[Join]],
         upright: Sequence[int],
         late: bool = False,
+        passed: bool = False,
     ) -> bool:
+        """Whether there is a place for some units; `passed`: where they come across the way of its
+        carrier, which passes the pile on to another robot."""
         chosen: tuple[_Place, list[Join]] | None = None
         for place in self.places:
             if chosen is not None and not (late and place.is_on(chosen[0])):
                 continue
             if {*needed} <= {*self._with_screws(place.units, place.path)}:
-                joins = self._ways(come, place, upright, at is self.driven)
+                axis = 1 - place.axis if passed else place.axis
+                joins = self._ways(come, replace(place, axis=axis), upright, at is self.driven)
                 chosen = (place, joins) if joins else chosen
         if chosen is not None:
             at.setdefault(chosen[0].path, []).extend(chosen[1])
@@ -183,6 +190,7 @@ class Fastening:
     def result(self, dwell: float) -> Judged:
         """The tree with its screws, and with their nuts. Each screw takes a robot that brings it,
         and those of one sub-assembly a driver for `dwell` [s] one after the other."""
+        turns = sum(len(self._runs(place.path)) // 2 * 2 for place in self.places)
         screws = [join for joins in self.driven.values() for join in joins]
         rings = [join for joins in self.put.values() for join in joins]
         most = max(map(len, self.driven.values()), default=0)
@@ -190,16 +198,32 @@ class Fastening:
             self.judged,
             tree=self._rebuilt(self.judged.tree, ()),
             joins=(*self.judged.joins, *screws, *rings),
-            robots=self.judged.robots + len(screws) + len(self.driven) + 2 * len(rings),
+            relays=self.judged.relays + turns,
+            robots=self.judged.robots + len(screws) + len(self.driven) + 2 * len(rings) + turns,
             seconds=self.judged.seconds + dwell * most,
         )
 
     def _rebuilt(self, tree: Tree, path: tuple[int, ...]) -> Tree:
         if not isinstance(tree, int):
             tree = tuple(self._rebuilt(below, (*path, n)) for n, below in enumerate(tree))
-        if joins := self.driven.get(path):
-            tree = Screwed(tree, tuple(join.come[0] for join in joins))
-        return self._with_rings(tree, path)
+        runs = self._runs(path)
+        for number, run in enumerate(runs):
+            tree = (tree,) if number else tree
+            tree = Screwed(tree, tuple(run)) if run else tree
+        return self._with_rings(tree if len(runs) % 2 else (tree,), path)
+
+    def _runs(self, path: tuple[int, ...]) -> list[list[int]]:
+        """The screws of a place one after the other, in runs between which it is passed on to a
+        robot on the other axis: those of the first, which may be none, come from above or along the
+        axis of its carrier, those of the second along the other one."""
+        runs, here = [list[int]()], ROOT_AXIS ^ len(path) % 2
+        for join in self.driven.get(path, []):
+            along = self.up.axes.index(join.direction[0])
+            if along != here and not join.lowered:
+                runs.append([])
+                here = 1 - here
+            runs[-1].append(join.come[0])
+        return runs
 
     def _with_rings(self, tree: Tree, path: tuple[int, ...]) -> Tree:
         """A sub-assembly with its nuts and washers: those from above, or from the side, are
@@ -240,10 +264,10 @@ def fastened(
     graphs: Blocking, judged: Judged, threads: Sequence[Thread], dwell: float, drivers: Drivers
 ) -> tuple[Judged, tuple[int, ...]]:
     """A tree of all other units with the screws in it, and their nuts, and those of both for which
-    there is no place. They come last where that takes no longer."""
+    there is no place. They come last where that takes no longer, and costs no more."""
     early, late = (_fastened(graphs, judged, threads, dwell, drivers, n) for n in (False, True))
-    equal = len(late[1]) <= len(early[1]) and late[0].seconds <= EQUAL * early[0].seconds
-    return late if equal else early
+    no_worse = len(late[1]) <= len(early[1]) and late[0].price <= early[0].price
+    return late if no_worse and late[0].seconds <= EQUAL * early[0].seconds else early
 
 
 def _fastened(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array
-from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
+from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking, closure
 from factory.apps.planning.cannot import Units
 from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import RELAY, Best, Tree, TreeTask
@@ -89,7 +89,7 @@ class Divider:
                 locks, levels = self.graphs.locks[axis][here], self.graphs.levels[axis][here]
                 if turned:
                     locks, levels = locks.T, levels.T
-                needs = _reached(locks)
+                needs = closure(locks)
                 sets = np.unique(np.array([*needs, *self._grown(needs, touch, random)]), axis=0)
                 sets = sets[~sets.all(axis=1)]
                 for row, price in zip(sets, _prices(levels, sets).tolist(), strict=True):
@@ -115,17 +115,6 @@ class Divider:
                 grown = grown | needs[beside[weight[beside].argmin()]]
                 if not grown.all():
                     yield grown
-
-
-def _reached(locks: NDArray[np.bool_]) -> Sets:
-    """The units that must leave with each unit (n, n): itself, those that lock it, those that lock
-    these."""
-    reach = (locks | np.eye(len(locks), dtype=bool)).astype(np.float32)
-    while True:
-        further = (reach @ reach > 0).astype(np.float32)
-        if np.array_equal(further, reach):
-            return np.asarray(reach > 0)
-        reach = further
 
 
 def _prices(levels: NDArray[np.int8], sets: Sets) -> Array:

@@ -134,20 +134,14 @@ class Site:
         sums = whole.sums - self._unsound(whole.units, np.zeros(len(SUMS)))
         joins = tuple(_flat(whole.joins))
         unheld = sum(not self.graphs.can_hold(join.pile, join.come) for join in joins)
-        apart, tips, falls, under, relays, robots = (int(n) for n in sums)
         return Judged(
             tree=whole.tree,
             stance=self.stance,
             joins=joins,
-            apart=apart,
-            relays=relays,
             seconds=max(whole.seconds, last),
-            robots=robots,
             sizes=whole.sizes,
-            tips=tips,
-            falls=falls,
             unheld=unheld,
-            under=under,
+            **{name: int(count) for name, count in zip(SUMS, sums, strict=True)},
         )
 
     def _made(self, tree: Tree, axis: int) -> _Made:

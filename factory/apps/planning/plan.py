@@ -239,9 +239,6 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
             raise OutOfTime
 
     layouts = Layouts(source, templates, asked.settings, decomposed)
-    if not asked.lay_out:
-        made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0, firm)
-        return replace(made, screws=named)
 
     def said(best: LaidOut) -> None:
         laid[0] += 1
@@ -249,6 +246,9 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         asked.told(LAYING, laid[0], len(sought.all), words)
 
     try:
+        if not asked.lay_out:
+            made = _result(pose, layouts.of(sought.all[0]), sought.optimal, 0, firm)
+            return replace(made, screws=named)
         best = layouts.best(sought.all, asked.aim, budget, said)
     except OutOfTime:
         drafted = layouts.drafted(sought.all[0])

@@ -14,7 +14,7 @@ from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.shanks import shank_of
-from factory.apps.planning.standing import TIPS, overhang
+from factory.apps.planning.standing import TIPS, is_steady, overhang
 from factory.apps.planning.turning import only, turned, turns
 
 AS_DRAWN: Direction = (2, +1)
@@ -79,15 +79,15 @@ def posed(
 
 
 def _for_screws(source: InPlace, screws: Sequence[str]) -> Direction:
-    """The side up that most screws come from, if the product stands then, and those that come from
-    above as it is drawn are not half as many."""
+    """The side up that most screws come from, if the product stands steadily then, and those that
+    come from above as it is drawn are not half as many."""
     shanks = [shank_of(units[0]) for label, units in source.units() if label in screws]
     ways = Counter(shank.way for shank in shanks if shank is not None)
     if not ways:
         return AS_DRAWN
     most = max(SIDES, key=lambda side: ways[side])
     few = 2 * ways[AS_DRAWN] < ways[most]
-    return most if few and overhang(source.parts, along(most)) <= TIPS else AS_DRAWN
+    return most if few and is_steady(source.parts, along(most)) else AS_DRAWN
 
 
 def _freed(
@@ -146,9 +146,9 @@ def screwing(driven: Sequence[str], screws: Sequence[str]) -> tuple[str, ...]:
     other parts."""
     notes = []
     if driven:
-        some = "are driven in as screws" if len(driven) > 1 else "is a screw"
-        after = "after the parts that they clamp (--no-screws: ordinary parts)"
-        notes.append(f"{listing(driven, 12)} {some}, {after}")
+        some = "are driven in as screws" if len(driven) > 1 else "is driven in as a screw"
+        after = f"after the parts that {'they clamp' if len(driven) > 1 else 'it clamps'}"
+        notes.append(f"{listing(driven, 12)} {some}, {after} (--no-screws: ordinary parts)")
     if others := [label for label in screws if label not in driven]:
         some = "are screws and are" if len(others) > 1 else "is a screw and is"
         why = "no sub-assembly lets a driver get there from above, or along its axis"

@@ -20,6 +20,9 @@ LOW = 1e-2
 TIPS = 1e-5
 """The tolerance of the centre of mass outside the support [m]."""
 
+STEADY = 0.15
+"""A product stands steadily if it still stands on a floor of this slope."""
+
 AROUND = np.linspace(0, 2 * np.pi, 32, endpoint=False)
 ROUND = np.column_stack([np.cos(AROUND), np.sin(AROUND)])
 """The horizontal directions (32, 2) in which tipping is tested."""
@@ -105,6 +108,15 @@ def overhang(parts: Sequence[PlacedPart], up: Array) -> float:
     level = min(LEVEL, LOW * float(np.ptp(heights)))
     across = np.linalg.svd(up[None])[2][1:]
     return outside((points[heights <= heights.min() + level]) @ across.T, centre @ across.T)
+
+
+def is_steady(parts: Sequence[PlacedPart], up: Array) -> bool:
+    """Whether some parts stand if a direction (3,) of the product is up, also on a floor that is
+    inclined by STEADY."""
+    mass = np.array([part.solid.mass for part in parts])
+    centre = mass @ np.array([part.solid.centre for part in parts]) / mass.sum()
+    low = min(float((part.vertices @ up).min()) for part in parts)
+    return overhang(parts, up) <= -STEADY * (float(centre @ up) - low)
 
 
 def outside(points: Array, at: Array) -> float:

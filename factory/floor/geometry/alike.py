@@ -115,13 +115,18 @@ def _may_fit(one: PartShape, other: PartShape, slack: float) -> bool:
 
 
 def _searched(one: PartShape, other: PartShape, slack: float) -> RigidMotion | None:
-    """The motion found by matching two anchors of one shape with pairs of vertices of the other:
-    with the middles they determine the rotation, and anchors at rare distances have few
-    candidates."""
+    """The shift, if that is enough, or the motion found by matching two anchors of one shape with
+    pairs of vertices of the other: with the middles they determine the rotation, and anchors at
+    rare distances have few candidates."""
     from scipy.spatial import cKDTree
 
+    tree = cKDTree(other.spokes)
+    gap, order = tree.query(one.spokes)
+    unturned = gap.max() <= slack and len(np.unique(order)) == len(order)
+    if unturned and (motion := _fitted(one, other, order, slack)) is not None:
+        return motion
     first, second = _anchors(one, slack)
-    anchors, tree = one.spokes[[first, second]], cKDTree(other.spokes)
+    anchors = one.spokes[[first, second]]
     near = np.flatnonzero(np.abs(other.radii - one.radii[first]) <= 2 * slack)
     far = np.flatnonzero(np.abs(other.radii - one.radii[second]) <= 2 * slack)
     span, tries = float(np.linalg.norm(anchors[0] - anchors[1])), 0

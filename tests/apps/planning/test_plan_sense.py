@@ -3,20 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from factory.apps.planning.blocking import blocking
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.apps.planning.writing import Screwed, Tree, leaves, planned_product
+from factory.apps.planning.titles import Titles
+from factory.apps.planning.writing import Screwed, Tree, leaves, planned_product, screws_in
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
 from factory.theory.compiler.expanding import expand
 from tests.apps.planning.test_plan_audit import LEAST, cuts, ways
-from tests.engineered_products import MADE, Engineered, box, numbered, rod, screw, write_stl
+from tests.engineered_products import (
+    MADE,
+    Engineered,
+    along_x,
+    along_y,
+    box,
+    drilled,
+    numbered,
+    rod,
+    screw,
+    tube,
+    write_stl,
+)
 
 TEMPLATES = all_templates()
 
@@ -129,6 +144,80 @@ def test_screws_come_from_above_if_the_product_can_stand_so(tmp_path: Path) -> N
     found = planned(Engineered(turned, frozenset(), ()), tmp_path, QUICK)
     assert "the product stands with +x of the file up" in found.notes[0]
     assert all(join.lowered for join in found.operations)
+
+
+def test_a_product_is_not_put_onto_a_knob_for_its_screws(tmp_path: Path) -> None:
+    """They come from the side if what it would stand on then is small for its height."""
+    parts = {
+        "block": box(60, 60, 60) - along_x(rod(2, 10, 40)).translate((0, 0, 30)),
+        "plate": along_x(tube(25, 2.2, 30, 34)).translate((0, 0, 30)),
+        "screw": along_x(screw((0, 0), 34, 20, 2)).translate((0, 0, 30)),
+        "knob": along_x(rod(6, -40, -30)).translate((0, 0, 30)),
+    }
+    found = planned(Engineered(parts, frozenset(), ()), tmp_path, QUICK)
+    assert "the product stands as it was drawn, +z up" in found.notes[0]
+    assert screws_in(found.tree) == ("screw",)
+
+
+def test_the_base_is_below_what_is_as_heavy_and_touches_more(tmp_path: Path) -> None:
+    parts = {
+        "plate": box(120, 60, 20),
+        "block": drilled(box(80, 40, 40, (0, 0, 20)), [(-20, 0), (20, 0)], 3),
+        **numbered("peg", lambda place: rod(3, 20, 70, place), [(-20, 0), (20, 0)]),
+    }
+    found = planned(Engineered(parts, frozenset(), ()), tmp_path, QUICK)
+    assert leaves(found.tree)[0] == "plate"
+
+
+def test_what_is_in_a_hole_touches_it_whatever_its_play(tmp_path: Path) -> None:
+    """A lid as near to what is below it does not."""
+    parts = {
+        "tub": box(60, 40, 30) - box(56, 36, 40, (0, 0, 3)) + box(20, 20, 20, (0, 0, 3)),
+        "pin": rod(3, 10, 29.8),
+        "lid": box(60, 40, 3, (0, 0, 30)),
+    }
+    parts["tub"] = parts["tub"] - rod(3.2, 9.8, 40)
+    source = read_source(write_stl(parts, tmp_path), TEMPLATES, SourceOptions("mm"))
+    graphs = blocking(source)
+    pin, tub, lid = (graphs.labels.index(label) for label in ("pin", "tub", "lid"))
+    assert graphs.touch[pin, tub] and not graphs.touch[pin, lid]
+
+
+def test_a_screw_across_the_way_of_the_other_parts_is_driven_in(tmp_path: Path) -> None:
+    """Its pile is passed on to a robot on the other axis, and back."""
+    rail = box(100, 40, 10) + box(100, 20, 10, (0, 0, 10)) + box(100, 32, 8, (0, 0, 20))
+    slider = box(30, 60, 26, (0, 0, 11)) - box(40, 32.4, 8.4, (0, 0, 19.8))
+    slider = (
+        slider - box(40, 20.4, 20, (0, 0, 5)) - along_y(rod(1.5, -40, -16)).translate((0, 0, 24))
+    )
+    parts = {
+        "rail": rail,
+        "slider": slider,
+        "screw": along_y(rod(1.5, -30, -16.1) + rod(3, -34, -30)).translate((0, 0, 24)),
+    }
+    found = planned(Engineered(parts, frozenset(), ()), tmp_path, replace(QUICK, up=(2, +1)))
+    assert screws_in(found.tree) == ("screw",)
+    assert found.figures.relays == 2 and found.figures.blocked == 0
+    source = read_source(tmp_path, TEMPLATES, SourceOptions("mm"))
+    made = planned_product(source, found.tree, found.orientation)
+    judged = matings(expand(made.pag, TEMPLATES), product_geometry(made.pag, made.files))
+    assert len(judged.all) == 2 and not judged.of_kind("blocked")
+
+
+def test_names_say_what_is_in_and_what_on_another(tmp_path: Path) -> None:
+    """The key is named before the shaft, whichever comes; what is under a flange is not in it."""
+    shaft = rod(20, 60, 70) + rod(8, 0, 80)
+    parts = {
+        "tub": box(60, 60, 40) - box(54, 54, 50, (0, 0, 3)),
+        "cell": box(20, 20, 20, (0, 0, 3)),
+        "spool": shaft,
+        "ring": rod(3, 50, 60, (13, 0)),
+    }
+    source = read_source(write_stl(parts, tmp_path), TEMPLATES, SourceOptions("mm"))
+    titles = Titles(source, set())
+    assert titles.joined(("tub",), ("cell",)) == "cell_in_tub"
+    assert titles.joined(("ring",), ("spool",)) == "ring_on_spool"
+    assert titles.joined(("tub", "cell"), ("ring", "spool")) == "spool_on_tub"
 
 
 def test_a_driver_does_not_reach_a_screw_between_tall_walls(tmp_path: Path) -> None:

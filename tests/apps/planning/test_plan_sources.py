@@ -259,6 +259,13 @@ def test_a_part_is_recognised_wherever_it_is(name: str, by: RigidMotion, seed: i
     assert_same(moved(found, one.vertices), other.vertices)
 
 
+def test_a_round_copy_that_is_only_shifted_is_not_turned() -> None:
+    """Of the rotations that map a ring to itself none is chosen."""
+    one = FORMS["ring"]
+    found = motion_between(one, shuffled(PartShape(one.vertices + 0.2, one.faces), 1))
+    assert found is not None and np.allclose(found.turn, np.eye(3), atol=1e-9)
+
+
 def assert_same(one: Array, other: Array) -> None:
     """Two sets of points (n, 3) are the same."""
     from scipy.spatial import cKDTree
