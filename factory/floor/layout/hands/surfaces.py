@@ -56,7 +56,7 @@ class Faces:
         return np.asarray((self.offsets - at @ self.across) / self.along)
 
     def least(self, at: Array) -> Array:
-        """The least room (n,) of points (n, 2); infinite without faces. Many points are divided into
+        """The least room (n,) of points (n, 2); infinite without faces. Many points are divided in
         halves. Room is linear in the point, so that of a face within a rectangle is between those
         at the corners: a face is left out where another has less even at its worst corner."""
         if len(at) * len(self.offsets) <= MANY or len(at) == 1:
