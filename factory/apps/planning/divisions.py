@@ -118,12 +118,12 @@ def divisions(
     apart: bool = False,
     late: Late = never,
     limit: float = np.inf,
-    known: KnownDivisions | None = None,
+    store: KnownDivisions | None = None,
 ) -> Divisions:
     """All possible divisions. `apart`: whether sub-assemblies may be in pieces, at a price;
-    `known`: those that were computed before. Raises TooLate if there are more than a limit."""
-    known, made, total = KnownDivisions() if known is None else known, list[Batch](), 0
-    for every in known.of(subsets, axis, up, apart):
+    `store`: those that were computed before. Raises TooLate if there are more than a limit."""
+    made, total = list[Batch](), 0
+    for every in (store or KnownDivisions()).of(subsets, axis, up, apart):
         if late() or total > limit:
             raise TooLate
         batch = _based(every, subsets.based)

@@ -78,9 +78,9 @@ class _Measurements:
             self.free.add((one, standing, onto[axis], sign * order[axis].step))
         for (one, standing), shared in other.finished.items():
             box = np.sort(shared.box @ turn.T, axis=0)
-            found = replace(shared, deepest=shared.deepest @ turn.T, box=box)
-            self.finished[one, standing] = found
-            self.finished.setdefault((standing, one), found)
+            turned = replace(shared, deepest=shared.deepest @ turn.T, box=box)
+            self.finished[one, standing] = turned
+            self.finished.setdefault((standing, one), turned)
 
 
 def _ordered(row: tuple[Any, ...], order: slice) -> tuple[Any, ...]:
