@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
+from factory.support.cache import digest
 
 Late = Callable[[], bool]
 """Tells whether a search must end."""
@@ -116,18 +118,64 @@ def divisions(
     apart: bool = False,
     late: Late = never,
     limit: float = np.inf,
+    store: KnownDivisions | None = None,
 ) -> Divisions:
-    """All possible divisions. `apart`: whether sub-assemblies may be in pieces, at a price. Raises
-    TooLate if there are more than a limit."""
-    made, count = [], 0
-    for wholes in _batches(subsets, apart):
-        if late() or count > limit:
+    """All possible divisions. `apart`: whether sub-assemblies may be in pieces, at a price;
+    `store`: those that were computed before. Raises TooLate if there are more than a limit."""
+    made, total = list[Batch](), 0
+    for every in (store or KnownDivisions()).of(subsets, axis, up, apart):
+        if late() or total > limit:
             raise TooLate
-        batch = _divided(subsets, wholes, axis, up, apart)
-        count += len(batch.one)
+        batch = _based(every, subsets.based)
+        total += len(batch.one)
         if len(batch.one):
             made.append(batch)
     return Divisions(subsets, axis, up, tuple(made))
+
+
+class KnownDivisions:
+    """The divisions of the product that was last asked for, whatever its base: many searches differ
+    in the base alone, or in what is preferred."""
+
+    def __init__(self) -> None:
+        self._product = ""
+        self._batches: dict[tuple[int, int, bool], tuple[list[Batch], Iterator[Batch]]] = {}
+
+    def of(self, subsets: Subsets, axis: int, up: int, apart: bool) -> Iterator[Batch]:
+        """The divisions of the subsets of one size after the other, computed when they are asked
+        for; the side `one` of each has the lowest unit."""
+        product = digest(subsets.ways, subsets.hangs, subsets.unheld)
+        if product != self._product:
+            self._product, self._batches = product, {}
+        key = axis, up, apart
+        if key not in self._batches:
+            wholes = _batches(subsets, apart)
+            self._batches[key] = [], (_divided(subsets, w, axis, up, apart) for w in wholes)
+        made, rest = self._batches[key]
+        yield from _again(made, rest)
+
+
+def _again(made: list[Batch], rest: Iterator[Batch]) -> Iterator[Batch]:
+    """What is made, then the rest, which is added to it."""
+    for number in count():
+        if number == len(made):
+            one = next(rest, None)
+            if one is None:
+                return
+            made.append(one)
+        yield made[number]
+
+
+def _based(batch: Batch, based: NDArray[np.bool_]) -> Batch:
+    """The divisions in which the side that has the base (s,) is the first, and the other comes onto
+    it."""
+    swapped = based[batch.other]
+    one = np.where(swapped, batch.other, batch.one)
+    onto = np.where(swapped[:, None], batch.onto[:, ::-1], batch.onto)
+    levels, has_base = batch.levels.copy(), based[batch.whole]
+    levels[has_base, 2] = onto[has_base, 0]
+    moved = Batch(batch.whole, one, levels, onto)
+    return moved.where(np.isfinite(LEVEL_PRICES[levels]).any(axis=1))
 
 
 def _batches(subsets: Subsets, apart: bool) -> Iterator[Masks]:
@@ -149,15 +197,12 @@ def _divided(subsets: Subsets, wholes: Masks, axis: int, up: int, apart: bool) -
     if not apart:
         possible &= subsets.hangs[one] & subsets.hangs[whole ^ one]
     whole, one = whole[possible], one[possible]
-    one = np.where(subsets.based[whole ^ one], whole ^ one, one)
     sides = [
         [subsets.level(along, side, one, whole ^ one) for side in (0, 1)]
         for along in (*_level(axis), axis)
     ]
     levels = np.min(sides, axis=1).T
     onto = np.transpose(sides[2][::-up])
-    based = subsets.based[whole]
-    levels[based, 2] = onto[based, 0]
     return Batch(whole, one, levels, onto).where(np.isfinite(LEVEL_PRICES[levels]).any(axis=1))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from factory.api import Allowance, Array
 from factory.apps.planning.blocking import Blocking
-from factory.apps.planning.divisions import Divisions, Late, TooLate, divisions
+from factory.apps.planning.divisions import Divisions, KnownDivisions, Late, TooLate, divisions
 from factory.apps.planning.exact import Best, Expected, Tables, TreeTask, tables
 from factory.apps.planning.growing import bettered, divided
 from factory.apps.planning.judging import Judged, Site
@@ -69,7 +69,7 @@ def budget_of(
 @dataclass(frozen=True)
 class Sought:
     """A search for trees: the blocking `graphs`, the `stances` to try, the `budget`; `told` is
-    called with each tree."""
+    called with each tree; `known`: the divisions that were computed before."""
 
     graphs: Blocking
     expected: Expected
@@ -78,6 +78,7 @@ class Sought:
     budget: Allowance = field(default_factory=lambda: budget_of(MOST))
     told: Callable[[Judged], None] = field(default=lambda _: None)
     stances: tuple[Stance, ...] = field(default_factory=stances)
+    known: KnownDivisions = field(default_factory=KnownDivisions, compare=False, repr=False)
 
     def site(self, stance: Stance) -> Site:
         """The problem in one stance."""
@@ -176,7 +177,7 @@ def _ranks(sought: Sought, table: Subsets, apart: bool, late: Late) -> list[Rank
 
     @cache
     def all_of(axis: int, up: int) -> Divisions:
-        return divisions(table, axis, up, apart, late, DIVISIONS)
+        return divisions(table, axis, up, apart, late, DIVISIONS, sought.known)
 
     ranks: list[Rank] = []
     solved: dict[tuple[int, int, bytes], Tables] = {}

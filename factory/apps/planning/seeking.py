@@ -14,6 +14,7 @@ import numpy as np
 from factory.api import PAG, Allowance, Array, Template
 from factory.apps.planning.bases import EQUAL, likely, worth
 from factory.apps.planning.blocking import NO_RELATION, Blocking, Unheld
+from factory.apps.planning.divisions import KnownDivisions
 from factory.apps.planning.drivers import Drivers
 from factory.apps.planning.exact import Expected
 from factory.apps.planning.falling import held_by, senseless
@@ -46,6 +47,7 @@ class Seeking:
     templates: Mapping[str, Template] = field(repr=False)
     aim: Aim
     told: Callable[[Judged], None] = field(repr=False)
+    known: KnownDivisions = field(default_factory=KnownDivisions, compare=False, repr=False)
 
     def trees(self, budget: Allowance) -> Trees:
         """Candidate trees."""
@@ -111,8 +113,8 @@ class Seeking:
         groups = [[n, *(one.screw for one in made if one.into == n)] for n in rest]
         others = graphs.grouped(groups) if after else graphs
         prices = _kept_prices(only(self.source, others.labels), self.templates)
-        task = Sought(others, self.expected, prices, self.aim, budget, self.told, self.stances)
-        return task, rest
+        search = self.aim, budget, self.told, self.stances, self.known
+        return Sought(others, self.expected, prices, *search), rest
 
     def _with(
         self,

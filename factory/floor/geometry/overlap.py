@@ -267,6 +267,7 @@ def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     reach = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    boxed = [(body, np.array(body.bounding_box()).reshape(2, 3)) for body in (one, other)]
     points = [vertices[np.unique(faces)]]
     points[0] = points[0][:: -(-len(points[0]) // samples)]
     for row in np.argsort(-areas, kind="stable")[:samples].tolist():
@@ -275,14 +276,14 @@ def _within(shared: Any, one: Any, other: Any, samples: int) -> Array:
             hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)
             ends = [np.asarray(hit.position) for hit in hits[:1]]
             middles = [(begin + end) / 2 for end in ends]
-            inside = [m for m in middles if _is_inside(m, one) and _is_inside(m, other)]
+            inside = [m for m in middles if all(_is_inside(m, *body) for body in boxed)]
             points.append(np.array([begin, *ends, *inside]))
     return np.concatenate(points)
 
 
-def _is_inside(point: Array, body: Any) -> bool:
-    """Whether a point is inside a body: a ray from it leaves the body more often than it enters."""
-    box = np.array(body.bounding_box()).reshape(2, 3)
+def _is_inside(point: Array, body: Any, box: Array) -> bool:
+    """Whether a point is inside a body with a box (2, 3): a ray from it leaves the body more often
+    than it enters."""
     beyond = point + RAY * 2 * (np.linalg.norm(box[1] - box[0]) + np.abs(point - box).max())
     return bool(sum(np.sign(hit.normal @ RAY) for hit in body.ray_cast(point, beyond)) > 0)
 

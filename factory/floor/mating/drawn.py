@@ -60,17 +60,32 @@ class _Measurements:
             self._take(product.twin[0].kept(_Measurements, parts), product.twin[1])
 
     def _take(self, other: _Measurements, turn: Array) -> None:
-        """Take what was measured of the parts before a turn (3, 3): which ways are free and, if it
-        is none, how deep they are."""
+        """Take what was measured of the parts before a turn (3, 3) that brings axes onto axes."""
         place = np.column_stack([turn, np.zeros(3)])
         for label, coarse in other.coarse.items():
             self.coarse[label] = replace(coarse, body=coarse.body.transform(place))
         if np.array_equal(turn, np.eye(3)):
             self.pairs, self.sweeps, self.finished = other.pairs, other.sweeps, other.finished
+            self.free = other.free
+            return
+        onto = np.abs(turn).argmax(axis=0).tolist()
+        order = [slice(None, None, 1 if turn[onto[axis], axis] > 0 else -1) for axis in range(3)]
+        back = [slice(None, None, -one.step) for one in order]
+        for (one, standing, still, axis), row in other.pairs.items():
+            self.pairs[one, standing, still, onto[axis]] = _ordered(row, order[axis])
+            self.pairs.setdefault((standing, one, still, onto[axis]), _ordered(row, back[axis]))
         for one, standing, axis, sign in other.free:
-            onto = int(np.abs(turn[:, axis]).argmax())
-            side = sign if turn[onto, axis] > 0 else -sign
-            self.free.add((one, standing, onto, side))
+            self.free.add((one, standing, onto[axis], sign * order[axis].step))
+        for (one, standing), shared in other.finished.items():
+            box = np.sort(shared.box @ turn.T, axis=0)
+            turned = replace(shared, deepest=shared.deepest @ turn.T, box=box)
+            self.finished[one, standing] = turned
+            self.finished.setdefault((standing, one), turned)
+
+
+def _ordered(row: tuple[Any, ...], order: slice) -> tuple[Any, ...]:
+    """What is known of a way, with the sides from which a part comes in this order."""
+    return (row[0], *(sides[order] for sides in row[1:]))
 
 
 class DrawnWays:

@@ -32,6 +32,9 @@ FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
 
 
+MANY = 1 << 15
+"""The most pairs of points and faces whose room is computed for each pair."""
+
 BLOCK = 256
 """Of so many points it is looked at together where they are on a body of many faces: what is worked
 out for each point and face stays in the processor's cache."""
@@ -39,16 +42,34 @@ out for each point and face stays in the processor's cache."""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Faces:
-    """Some faces of a body as seen along an axis: their outward normals' shares `along` (f,) and
-    `across` (2, f) it, and how far they reach along those, `offsets` (f,) [m]."""
+    """Some faces of a body as seen along an axis: the shares of their outward normals `across`
+    (2, f) it and, without sign, `along` (f,) it, 1 where they are parallel to it, and how far they
+    reach along their normals, `offsets` (f,) [m]."""
 
     along: Array
     across: Array
     offsets: Array
 
     def room(self, at: Array) -> Array:
-        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]."""
-        return np.asarray(self.offsets - at @ self.across)
+        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]:
+        along the axis or, where the face is parallel to it, across."""
+        return np.asarray((self.offsets - at @ self.across) / self.along)
+
+    def least(self, at: Array) -> Array:
+        """The least room (n,) of points (n, 2); infinite without faces. Many points are divided in
+        halves. Room is linear in the point, so that of a face within a rectangle is between those
+        at the corners: a face is left out where another has less even at its worst corner."""
+        if len(at) * len(self.offsets) <= MANY or len(at) == 1:
+            return np.asarray(self.room(at).min(axis=1, initial=np.inf))
+        low, high = at.min(axis=0), at.max(axis=0)
+        ends = self.room(np.array([*pairs(*zip(low, high, strict=True))]))
+        least = ends.min(axis=0) <= ends.max(axis=0).min() + FLAT
+        faces = Faces(self.along[least], self.across[:, least], self.offsets[least])
+        order = np.argsort(at[:, (high - low).argmax()], kind="stable")
+        room = np.empty(len(at))
+        for half in np.array_split(order, 2):
+            room[half] = faces.least(at[half])
+        return room
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +105,8 @@ class Body:
         for axis, along in enumerate(normals.T):
             across = normals[:, [a for a in range(3) if a != axis]]
             sides = np.abs(along) < FLAT, along < -FLAT, along > FLAT
-            one, two, three = (Faces(along[s], across[s].T, offsets[s]) for s in sides)
+            size = np.where(sides[0], 1.0, np.abs(along))
+            one, two, three = (Faces(size[s], across[s].T, offsets[s]) for s in sides)
             by_axis.append((one, two, three))
         return tuple(by_axis)
 
@@ -136,10 +158,8 @@ class Body:
             )
         beside, back, out = self.facing[axis]
         at = points[:, [a for a in range(3) if a != axis]]
-        inside = (beside.room(at) >= -FLAT).all(axis=1)
-        first = (back.room(at) / back.along).max(axis=1, initial=-np.inf)
-        last = (out.room(at) / out.along).min(axis=1, initial=np.inf)
-        inside &= first <= last
+        first, last = -back.least(at), out.least(at)
+        inside = (beside.least(at) >= -FLAT) & (first <= last)
         return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
 
 
@@ -171,9 +191,9 @@ class Surfaces:
                 np.maximum(reach, out, out=reach, where=beside)
                 continue
             # what ends further in than what is known is not looked at
-            for near in blocks(np.flatnonzero(beside & (reach < out + FLAT))):
-                enter, leave = body.crossed(points[near], axis)
-                reach[near] = np.maximum(reach[near], leave if way > 0 else -enter)
+            near = np.flatnonzero(beside & (reach < out + FLAT))
+            enter, leave = body.crossed(points[near], axis)
+            reach[near] = np.maximum(reach[near], leave if way > 0 else -enter)
         return reach
 
 
