@@ -277,7 +277,9 @@ def _stroke(m: mujoco.MjModel, holder: int) -> float:
 
 def _way(m: mujoco.MjModel, d: mujoco.MjData, body: int, load: Array) -> Array:
     """The way of a robot from the B end of its guidepath to that of its rail at A, or of the tray
-    until half of its load is in the shed (3,) [m]."""
+    until half of its load is in the shed (3,) [m]; none of what stands."""
+    if not m.body_jntnum[body]:
+        return np.zeros(3)
     name, along = m.body(body).name, d.xaxis[m.body_jntadr[body]]
     if name != names.OUTFEED_TRAY:
         rail = f"{name.partition('/')[0]}/rail"
