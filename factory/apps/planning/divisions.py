@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import Array
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
-from factory.support.cache import digest
 
 Late = Callable[[], bool]
 """Tells whether a search must end."""
@@ -138,14 +138,14 @@ class KnownDivisions:
     in the base alone, or in what is preferred."""
 
     def __init__(self) -> None:
-        self._product = ""
+        self._product: tuple[Any, ...] = ()
         self._batches: dict[tuple[int, int, bool], tuple[list[Batch], Iterator[Batch]]] = {}
 
     def of(self, subsets: Subsets, axis: int, up: int, apart: bool) -> Iterator[Batch]:
         """The divisions of the subsets of one size after the other, computed when they are asked
         for; the side `one` of each has the lowest unit."""
-        product = digest(subsets.ways, subsets.hangs, subsets.unheld)
-        if product != self._product:
+        product = subsets.ways, subsets.hangs, subsets.unheld
+        if not self._is_last(product):
             self._product, self._batches = product, {}
         key = axis, up, apart
         if key not in self._batches:
@@ -153,6 +153,11 @@ class KnownDivisions:
             self._batches[key] = [], (_divided(subsets, w, axis, up, apart) for w in wholes)
         made, rest = self._batches[key]
         yield from _again(made, rest)
+
+    def _is_last(self, product: tuple[Any, ...]) -> bool:
+        """Whether divisions of these subsets were last asked for."""
+        pairs = zip(product, self._product, strict=False)
+        return bool(self._product) and all(np.array_equal(one, other) for one, other in pairs)
 
 
 def _again(made: list[Batch], rest: Iterator[Batch]) -> Iterator[Batch]:
