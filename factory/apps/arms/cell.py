@@ -64,6 +64,10 @@ class ToolGrip:
         """Orientation of the tool in the world (3, 3), its z down."""
         return down(self.yaw)
 
+    def local(self, place: Array) -> Array:
+        """A place of the product's frame in that of the tool's tip (3,) [m]."""
+        return np.asarray(self.turn.T @ (place - self.tip))
+
 
 def down(yaw: float) -> Array:
     """The orientation (3, 3) of a tool that points down, turned about the vertical [rad]: a half
@@ -142,8 +146,8 @@ class CellChains:
 
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         grip = self.grips[label]
-        place = grip.turn.T @ (np.asarray(centre) - grip.tip) + [0.0, 0.0, STEM]
-        return (*place.tolist(), 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
+        x, y, z = grip.local(np.asarray(centre)).tolist()
+        return (x, y, z + STEM, 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
 
     def hand(self, label: str) -> Hand:
         x, y, z = map(float, self.grips[label].tip)

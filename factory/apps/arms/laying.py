@@ -132,7 +132,7 @@ def _chains(
         for t in each:
             solid, leaf = cell.product.solids[t.label], factory.by_label[t.label].index
             join = factory.parents[leaf]
-            center = t.grip.turn.T @ (solid.centre - t.grip.tip)
+            center = t.grip.local(solid.centre)
             rows[leaf, number], rows[join, number] = len(legs), len(legs) + 1
             legs.append(Leg(cell.chain, t.goes, REACH, False, np.zeros(3), damping))
             legs.append(Leg(cell.chain, t.brings, REACH, True, center, damping))

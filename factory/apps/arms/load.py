@@ -47,7 +47,7 @@ class Load:
     @property
     def center(self) -> Array:
         """The part's centre of mass in the tool's frame (3,) [m]."""
-        return np.asarray(self.grip.turn.T @ (self.solid.centre - self.grip.tip))
+        return self.grip.local(self.solid.centre)
 
     @property
     def moment(self) -> Array:

@@ -161,24 +161,24 @@ def of_its_factory() -> Iterator[None]:
 
 @of_its_factory()
 def factory_of(header: Mapping[str, Any]) -> Factory:
-    """The factory that a log's PAG, templates and plan compile to; meshes are not read.
+    """The factory that a log's PAG, templates and plan compile to; meshes are read for a cell only.
 
     Raises InputError (BadLog) where its names are not those of the header, or the run's first
     marking is not one of its own.
     """
-    if "cell" in header:
-        factory = project_of(header, Path()).plain
-        check_names(factory, header)
-        firings(factory.net, frozenset(header["start"]))
-        return factory
+    factory = project_of(header, Path()).plain if "cell" in header else _compiled(header)
+    check_names(factory, header)
+    firings(factory.net, frozenset(header["start"]))
+    return factory
+
+
+def _compiled(header: Mapping[str, Any]) -> Factory:
+    """The factory on rails of a header."""
     made, catalogue = ProjectTable.of(header), load_catalogue()
     templates = _templates(made)
     pag = read_pag(made.pag.text, templates, made.pag.file, None)
     single = compile_pag(pag, templates, catalogue, {}, made.plan)
-    factory = shared(single, made.plan, catalogue)
-    check_names(factory, header)
-    firings(factory.net, frozenset(header["start"]))
-    return factory
+    return shared(single, made.plan, catalogue)
 
 
 def check_names(factory: Factory, header: Mapping[str, Any]) -> None:

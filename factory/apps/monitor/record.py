@@ -165,9 +165,9 @@ def word_of(log: Log, factory: Factory) -> Word | None:
 @of_its_factory()
 def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
     """The subject of a log. Raises InputError (BadLog) where its header has no factory."""
-    start, table = frozenset(header["start"]), value_of(MonitorTable, header["monitor"], "monitor")
+    factory, start = factory_of(header), frozenset(header["start"])
+    table = value_of(MonitorTable, header["monitor"], "monitor")
+    subject = table.subject(factory, settings_of(header), start, header["wip"])
     if "cell" in header:
-        layout = project_of(header, Path()).layout
-        subject = table.subject(layout.factory, settings_of(header), start, header["wip"])
-        return replace(subject, chains=layout.chains)
-    return table.subject(factory_of(header), settings_of(header), start, header["wip"])
+        return replace(subject, chains=project_of(header, Path()).layout.chains)
+    return subject

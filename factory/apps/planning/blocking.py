@@ -253,8 +253,8 @@ def blocking(source: InPlace) -> Blocking:
     near = touch | _within(finder, unit, count, NEAR)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
     locks, pressed = levels >= LOCKED, np.zeros((count, count), bool)
-    ways = locks.sum(axis=0) + locks.sum(axis=0).T
-    touch |= near & (ways >= GUIDED)
+    locked = locks.sum(axis=0)
+    touch |= near & (locked + locked.T >= GUIDED)
     drawn_in = overlaps.depths.finished > TOLERANCE
     pressed[unit[overlaps.one[drawn_in]], unit[overlaps.other[drawn_in]]] = True
     graphs = Blocking(labels, levels, locks, touch, *bounds, depths, hidden)

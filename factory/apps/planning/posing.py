@@ -14,7 +14,7 @@ from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.shanks import shank_of
-from factory.apps.planning.standing import TIPS, is_steady, overhang
+from factory.apps.planning.standing import STEADY, TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
 
 AS_DRAWN: Direction = (2, +1)
@@ -87,7 +87,7 @@ def _for_screws(source: InPlace, screws: Sequence[str]) -> Direction:
         return AS_DRAWN
     most = max(SIDES, key=lambda side: ways[side])
     few = 2 * ways[AS_DRAWN] < ways[most]
-    return most if few and is_steady(source.parts, along(most)) else AS_DRAWN
+    return most if few and overhang(source.parts, along(most), STEADY) <= 0.0 else AS_DRAWN
 
 
 def _freed(

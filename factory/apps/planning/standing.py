@@ -98,25 +98,18 @@ def feet(units: Sequence[Sequence[PlacedPart]], up: Array) -> Feet:
     return Feet(np.array(mass), np.array(centre), np.array(low), np.array(reach))
 
 
-def overhang(parts: Sequence[PlacedPart], up: Array) -> float:
+def overhang(parts: Sequence[PlacedPart], up: Array, slope: float = 0.0) -> float:
     """The distance [m] of the centre of mass of some parts outside their support polygon if a
-    direction (3,) of the product is up; negative inside it."""
+    direction (3,) of the product is up, and the floor falls by a slope in any direction; negative
+    inside it."""
     mass = np.array([part.solid.mass for part in parts])
     centre = mass @ np.array([part.solid.centre for part in parts]) / mass.sum()
     points = np.concatenate([part.vertices for part in parts])
     heights = points @ up
     level = min(LEVEL, LOW * float(np.ptp(heights)))
     across = np.linalg.svd(up[None])[2][1:]
-    return outside((points[heights <= heights.min() + level]) @ across.T, centre @ across.T)
-
-
-def is_steady(parts: Sequence[PlacedPart], up: Array) -> bool:
-    """Whether some parts stand if a direction (3,) of the product is up, also on a floor that is
-    inclined by STEADY."""
-    mass = np.array([part.solid.mass for part in parts])
-    centre = mass @ np.array([part.solid.centre for part in parts]) / mass.sum()
-    low = min(float((part.vertices @ up).min()) for part in parts)
-    return overhang(parts, up) <= -STEADY * (float(centre @ up) - low)
+    off = outside((points[heights <= heights.min() + level]) @ across.T, centre @ across.T)
+    return off + slope * float(centre @ up - heights.min())
 
 
 def outside(points: Array, at: Array) -> float:

@@ -245,11 +245,13 @@ def carried_ahead(layout: Layout) -> dict[tuple[int, int], float]:
     """For robots that go ahead of an operation with what they bring, by operation and robot
     (index), how far short of their places there they wait [m]."""
     chains, ahead = layout.chains, dict[tuple[int, int], float]()
-    for operation in layout.factory.operations if chains else ():
+    if chains is None:
+        return ahead
+    for operation in layout.factory.operations:
+        short = chains.waits(operation.index)
         for robot, label in zip(operation.robots, operation.before, strict=True):
-            if chains and robot in chains.robots and label != NOPART:
-                short = chains.waits(operation.index)
-                ahead |= {} if short is None else {(operation.index, robot): short}
+            if short is not None and robot in chains.robots and label != NOPART:
+                ahead[operation.index, robot] = short
     return ahead
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from unittest.mock import patch
 
+import numpy as np
 import pytest
 
 from factory.api import Diagnostic, RunError
@@ -149,6 +150,19 @@ def test_what_a_cell_cannot_make_is_refused_where_it_is(
     why = refusal(text)
     assert why.code == code and said in why.message and "rails" in why.hint
     assert (why.position.line if why.position else None) == line
+
+
+def test_what_a_pad_bears_is_in_the_frame_of_its_part() -> None:
+    """A weight pulls off a part that hangs, and slides one that an arm has turned on its side."""
+    simulation = Simulation(cell("six"), RunRequest(units=1))
+    world = simulation.physical
+    strength, m, d = world.parts.strength, world.m, world.d
+    weld = next(weld for (robot, _), weld in world.parts.holdings.grips().items() if robot == 1)
+    d.xmat[m.eq_obj2id[weld]] = [1, 0, 0, 0, 0, -1, 0, 1, 0]
+    force = np.array([[0.0, 0.0, -10.0, 1.0, 2.0, 3.0]] * 2)[..., None]
+    seen = strength._in_bodies(force, np.array([True, False]), np.array([weld, weld]))[..., 0]
+    assert seen.tolist() == [[0.0, -10.0, 0.0, 1.0, 2.0, 3.0], [0.0, 0.0, -10.0, 1.0, 2.0, 3.0]]
+    assert force[0, 1, 0] == 0.0
 
 
 def test_check_lays_a_cell_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,6 +14,7 @@ from factory.apps.log import read_log
 from factory.apps.log.blocks import LENGTH, MAGIC
 from factory.apps.log.project_table import project_of
 from factory.apps.log.writer import LogWriter
+from factory.apps.monitor.record import recorded_subject
 from factory.pipeline import read
 from tests.apps.arms.test_own_arm import BOX, own
 from tests.arm_cells import SMALL
@@ -80,6 +81,8 @@ def test_what_a_log_says_of_its_arms_is_not_trusted(small: Path, tmp_path: Path)
         with pytest.raises((ValueError, InputError)) as error:
             project_of(forged, tmp_path)
         assert said in str(error.value)
+    with pytest.raises(InputError, match="its net is not that of its PAG"):
+        recorded_subject({**header, "robots": ["r1", "r9"]})
 
 
 def test_a_log_has_a_layout_or_a_cell(small: Path, tmp_path: Path) -> None:
