@@ -77,10 +77,7 @@ def _placing(pag: PAG) -> PAG:
 def _nodes(pag: PAG) -> Iterator[Assembly]:
     """The nodes with two inputs at most: `x = mate ( a, b, c )` is placed one by one."""
     for node in pag.nodes:
-        if len(node.inputs) == 1:
-            message = f"'{node.label}' is made by a tool, {node.operation}; a cell has none"
-            raise InputError(Diagnostic("NoCell", message, node.position, RAILS))
-        if not node.inputs:
+        if len(node.inputs) < 2:
             yield node
             continue
         piles = [label for label in node.inputs if pag[label].inputs]

@@ -10,13 +10,23 @@ from math import asin, cos, pi, sin
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Factory, Guidepath, Layout, Product, RunError
+from factory.api import (
+    Array,
+    Diagnostic,
+    Factory,
+    Guidepath,
+    Layout,
+    Operation,
+    Product,
+    RunError,
+)
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
 from factory.apps.arms.cell import GAP, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.reach import Ring, ring_of
 from factory.apps.arms.scene import StandingBox
+from factory.apps.arms.tools import Tool, tools_of, works_at
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
 from factory.floor.geometry.suction import PadPlace, pad_place
 from factory.floor.layout.dimensions import PAYLOAD
@@ -50,7 +60,7 @@ class Arrangement:
     """The places in a cell.
 
     Attributes:
-        factory: the factory; its first robot is the carrier, all others are arms.
+        factory: of the carrier, tools that work on what it carries, and arms.
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
         aside: least angle between the station and a feeder, as its arm sees them [rad].
@@ -66,10 +76,25 @@ class Arrangement:
         """The solids."""
         return self.rails.product
 
-    @property
-    def arms(self) -> range:
+    @cached_property
+    def arms(self) -> tuple[int, ...]:
         """The arms (index)."""
+        return tuple(robot.index for robot in self.factory.robots if robot.body.first.moves)
+
+    @property
+    def others(self) -> range:
+        """All robots but the carrier (index)."""
         return range(1, len(self.factory.robots))
+
+    @cached_property
+    def tools(self) -> dict[int, Tool]:
+        """The tools by index."""
+        room = [well.feeder.housing for well in self.wells.values()]
+        room += map(_round, self.stands.values())
+        solids = (self.product.solids[label] for label in self.arm_of)
+        widest = max(float(np.linalg.norm((one.high - one.low)[:2])) for one in solids)
+        near = float(self.half[0]) + widest / 2 + APART
+        return tools_of(self.factory, self.rails, self.station[0], near, room)
 
     def labels(self, arm: int) -> list[str]:
         """The parts that an arm takes, in the order of its program."""
@@ -88,18 +113,27 @@ class Arrangement:
 
     @cached_property
     def lane(self) -> float:
-        """From the station to either end of the carrier's line [m]."""
+        """From the station to the outfeed [m]."""
         return round(LANE + 2 * float(self.half[0]), 3)
 
     @cached_property
     def line(self) -> Guidepath:
-        """The carrier's guidepath, its station in the middle."""
-        return replace(self.rails.guidepaths[0], travel=2 * self.lane)
+        """The carrier's guidepath."""
+        behind = [self.station[0] - tool.box[0] for tool in self.tools.values()]
+        behind = [self.lane, *(far + 2 * float(self.half[0]) for far in behind)]
+        return replace(self.rails.guidepaths[0], travel=round(self.lane + max(behind), 3))
 
     @cached_property
     def station(self) -> tuple[float, float]:
         """The product's middle at the station [m]."""
-        return self.line.middle(self.line.reach + self.lane)
+        path = self.rails.guidepaths[0]
+        return path.middle(path.reach + self.lane)
+
+    def stop(self, operation: Operation) -> float:
+        """How far from its feeder the carrier stands in an operation [m]."""
+        at = works_at(self.tools, operation)
+        at = self.station[0] if at is None else at
+        return round(at - self.line.middle(self.line.length)[0], 6)
 
     @cached_property
     def show(self) -> float:
@@ -274,6 +308,9 @@ class Arrangement:
             ("housing", feeder.housing, feeder.low),
         ):
             yield _upright(f"the {name} of '{first}'", box, bottom, feeder.high)
+        for tool in self.tools.values():
+            name = self.factory.robots[tool.robot].name
+            yield _upright(name, tool.box, 0.0, tool.high)
         yield _upright("the outfeed's shed", bare.shed, 0.0, self.top + 0.06)
         yield _upright("the outfeed", bare.outfeed, 0.0, self.top)
         for other, stand in self.stands.items():
@@ -306,6 +343,7 @@ class Arrangement:
         xlo, xhi, ylo, yhi = self.rails.floor
         boxes = [well.feeder.housing for well in self.wells.values()]
         boxes += map(_round, self.stands.values())
+        boxes += [tool.box for tool in self.tools.values()]
         c, path = self.rails.clearance, self.rails.guidepaths[0]
         further = path.middle(path.length)[0] - self.line.middle(self.line.length)[0]
         behind = xlo - further

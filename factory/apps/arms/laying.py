@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -160,8 +161,9 @@ def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) 
     """The layout with legs of a length [m]."""
     factory, (x, y) = cell.factory, cell.station
     arm = Guidepath((1.0, 0.0), (0.0, 1.0), (x, y), length, REACH, 0.0, 0.0, 0.0)
-    paths = (cell.line, *(arm for _ in cell.arms))
-    stations = [cell.lane if o.carrier == 0 and o.inputs else 0.0 for o in factory.operations]
+    tools = cell.tools
+    paths = (cell.line, *(tools[n].path if n in tools else arm for n in cell.others))
+    stations = [cell.stop(o) if o.carrier == 0 and o.inputs else 0.0 for o in factory.operations]
     visits = visits_of(factory, paths, stations)
     for label, well in cell.wells.items():
         key = factory.by_label[label].index, cell.arm_of[label]
@@ -173,7 +175,7 @@ def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) 
         factory=factory,
         guidepaths=paths,
         visits=visits,
-        hands=(cell.rails.hands[0], *(None for _ in cell.arms)),
+        hands=(cell.rails.hands[0], *(tools[n].hand if n in tools else None for n in cell.others)),
         floor=cell.floor,
         certificate=None,
         plain=None,
@@ -254,9 +256,12 @@ def _orders(
         if one != other:
             past = gone(before, private[left.label].leaves)
             yield Away(past, after.index, int(after is joins[0]))
-    arm, tour = of[_brought(cell, joins[-1])]
-    off = _next(tours[arm], tour.label).goes.off
-    yield Away(gone(joins[-1], off), factory.dropoff.index, 0)
+    carried = [factory.operations[number] for number in factory.robots[0].operations]
+    for join, then in pairwise(carried):
+        if join in joins and then not in joins:
+            arm, tour = of[_brought(cell, join)]
+            off = _next(tours[arm], tour.label).goes.off
+            yield Away(gone(join, off), then.index, 0)
 
 
 def _exclusions(
@@ -322,5 +327,7 @@ def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     for label, well in cell.wells.items():
         arm = cell.arm_of[label]
         yield Region(arm, PAYLOADS, POST_BODY, well.feeder.housing, (0.0, cell.top), label)
+    for tool in cell.tools.values():
+        yield from tool.regions
     shed = layout.shed
     yield Region(0, PAYLOADS, POST_BODY, shed, (0.0, cell.top))
