@@ -19,6 +19,7 @@ from factory.api import (
     Operation,
     Product,
     RunError,
+    Solid,
 )
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
@@ -45,14 +46,35 @@ LANE = 0.32
 FULL = pi - 0.1
 """Angle from the station up to which there are feeders on either side of an arm [rad]."""
 
-ABOVE = 0.022
+SHARES = 0.45, 0.35, 0.25
+"""Radii of pads as shares of a part's least extent in plan that are tried."""
+
+ABOVE = 0.018
 """How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""
 
 OVER_WELL = 0.06
-"""How far a tool goes straight up from a feeder at least [m]."""
+"""Length of a straight end at a feeder at least [m]."""
 
-STRAIGHT = 0.5
-"""Share of a straight end that stays straight where the leg is rounded (`legs.leg`)."""
+CURVE = 0.06
+"""Length of the most of a straight end that may be rounded, beyond what stays straight [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rise:
+    """A straight end of a way, above the visit.
+
+    Attributes:
+        straight: how far it stays straight; what is beyond may be rounded [m].
+        length: of it all [m].
+    """
+
+    straight: float
+    length: float
+
+    @classmethod
+    def of(cls, straight: float) -> Rise:
+        """One that stays straight so far [m]."""
+        return cls(straight, straight + min(straight, CURVE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +86,14 @@ class Arrangement:
         rails: the layout of the same product on rails, whose carrier's line and hand it takes.
         chain: the arms, to the tip of their tools.
         aside: least angle between the station and a feeder, as its arm sees them [rad].
+        far: how far an arm stands from the station, as a share of the width of its ring.
     """
 
     factory: Factory
     rails: Layout
     chain: SerialChain
     aside: float = 0.0
+    far: float = 0.41
 
     @property
     def product(self) -> Product:
@@ -149,9 +173,11 @@ class Arrangement:
         for label, tip in self.tip.items():
             shown = self.show + float(tip[2] - self.product.solids[label].low[2])
             placed = PAYLOAD + float(tip[2]) - low
-            tips += [shown, placed, shown + self.over_well, placed + self.rises(label)]
-            tips.append(placed + self.leaves(label))
-        ring = ring_of(self.chain, min(tips), max(tips))
+            tips += [shown, placed, shown + self.over_well.length]
+            tips += [placed + self.rises(label).length, placed + self.leaves(label).length]
+        aside = (tip[:2] - self.product.middle[:2] for tip in self.tip.values())
+        spread = max(float(np.linalg.norm(off)) for off in aside)
+        ring = ring_of(self.chain, min(tips), max(tips), spread)
         if ring is None:
             message = (
                 f"the arm does not come from {1e3 * min(tips):.0f} to {1e3 * max(tips):.0f} mm up"
@@ -162,13 +188,18 @@ class Arrangement:
             )
         return ring
 
+    @property
+    def near(self) -> float:
+        """Distance of the station from an arm's axis [m]."""
+        return self.ring.at(self.far)
+
     @cached_property
     def stands(self) -> dict[int, Stand]:
         """Where the arms stand, to the left and right of the line in turn."""
         if len(self.arms) > len(SIDES):
             message = f"{len(self.arms)} arms have no room at one station"
             raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
-        (x, y), off = self.station, self.ring.near
+        (x, y), off = self.station, self.near
         return {
             arm: Stand((x, y + side * off, self.ring.base), -side * pi / 2, self.pad)
             for arm, side in zip(self.arms, SIDES, strict=False)
@@ -188,14 +219,14 @@ class Arrangement:
         """Where the parts of an arm are shown: on a circle round it, the first ones next to the
         carrier's line; to the right and left of the station in turn, but with another arm opposite
         to the right as long as there is room: so the ways of both cross at the station alone."""
-        stand, radius = self.stands[arm], self.ring.near + CLOSER
+        stand, radius = self.stands[arm], self.near + CLOSER
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.rails.clearance
         angles = [0.0, 0.0]
         for number, label in enumerate(self.labels(arm)):
             solid = self.product.solids[label]
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
-            room = (self.ring.near - beside - wide) / radius
+            room = (self.near - beside - wide) / radius
             first = pi / 2 - asin(max(-1.0, min(1.0, room)))
             first = max(first, self.aside)
             side = number % 2
@@ -214,10 +245,7 @@ class Arrangement:
     @cached_property
     def pads(self) -> dict[str, PadPlace]:
         """Where a pad is on each part, and how large it may be there."""
-        solids, largest = self.product.solids, PAD_RADIUS
-        return {
-            label: pad_place(solids[label], (1.0, 0.0), largest=largest) for label in self.arm_of
-        }
+        return {label: _largest_pad(self.product.solids[label]) for label in self.arm_of}
 
     @cached_property
     def pad(self) -> float:
@@ -258,24 +286,25 @@ class Arrangement:
         """Height of the product's top [m]."""
         return PAYLOAD + float(self.product.high[2] - self.product.low[2])
 
-    def rises(self, label: str) -> float:
-        """How far above its place the tool begins to come straight down with a part: it is still
-        where a carrier may come and go at the end of what is rounded [m]."""
+    def rises(self, label: str) -> Rise:
+        """How a part comes straight down to its place, from where a carrier may still come and
+        go."""
         solid, o = self.product.solids[label], self.factory.by_label[label]
         bottom = PAYLOAD + float(solid.low[2] - self.product.low[2])
         parent = self.factory.operations[self.factory.parents[o.index]]
         stroke = parent.approach.stroke if parent.approach else 0.0
-        return max(stroke, self.top - bottom + ABOVE) / STRAIGHT
+        return Rise.of(max(stroke, self.top - bottom + ABOVE))
 
-    def leaves(self, label: str) -> float:
-        """How far the empty tool goes straight up from where it has placed a part [m]."""
+    def leaves(self, label: str) -> Rise:
+        """How the empty tool goes straight up from where it has placed a part."""
         tip = PAYLOAD + float(self.tip[label][2] - self.product.low[2])
-        return (self.top + ABOVE - tip) / STRAIGHT
+        return Rise.of(self.top + ABOVE - tip)
 
     @cached_property
-    def over_well(self) -> float:
-        """How far the tool goes straight up from a feeder [m]."""
-        return max(OVER_WELL, self.top + 2 * ABOVE - self.show)
+    def over_well(self) -> Rise:
+        """How the tool goes straight up from a feeder."""
+        length = max(OVER_WELL, self.top + 2 * ABOVE - self.show)
+        return Rise(length / 2, length)
 
     def loads(self, label: str) -> list[tuple[Array, Array, Array]]:
         """The boxes of a part in the tool's frame, held with the tool's angle at 0: place, half
@@ -372,6 +401,15 @@ def feeder_name(label: str) -> str:
 def placed_name(label: str) -> str:
     """What a part in the product is called."""
     return f"'{label}' in the product"
+
+
+def _largest_pad(solid: Solid) -> PadPlace:
+    """The largest pad that a part is level under; one of the least share for none."""
+    for share in SHARES:
+        place = pad_place(solid, (1.0, 0.0), largest=PAD_RADIUS, share=share)
+        if place.level:
+            break
+    return place
 
 
 def _round(stand: Stand) -> Box:

@@ -49,6 +49,12 @@ from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 ASIDE = 0.0, 1.2, 1.8
 """Angles that are tried as `Arrangement.aside` [rad]."""
 
+FAR = 0.41, 0.6, 0.8, 0.2
+"""Shares that are tried as `Arrangement.far`."""
+
+ELSEWHERE = "Unreachable", "NoWay", "Layout"
+"""Errors that an arm may not have where it stands nearer to the station, or farther from it."""
+
 REACH = 0.2
 """The coordinate of an arm's axis where it places [m]."""
 
@@ -67,10 +73,26 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
 
     Raises RunError: Unreachable, NoWay, ArmLoad, Layout.
     """
+    refused: RunError | None = None
+    for far in FAR:
+        try:
+            return _laid_out_at(factory, rails, arm, pace, far)
+        except RunError as error:
+            if not {*ELSEWHERE}.intersection(d.code for d in error.diagnostics):
+                raise
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def _laid_out_at(
+    factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits, far: float
+) -> Layout:
+    """The layout with arms as far from the station as `Arrangement.far` says."""
     blocked = ""
     for aside in ASIDE:
         try:
-            cell = Arrangement(factory, rails, with_tool(arm.chain), aside)
+            cell = Arrangement(factory, rails, with_tool(arm.chain), aside, far)
             return _with_legs(cell, arm, pace)
         except InEachOthersWay as error:
             blocked = blocked or str(error)

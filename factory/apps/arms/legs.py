@@ -179,7 +179,7 @@ def leg(
     ends: Clearance,
     pace: WayLimits,
     seed: int = 0,
-    stiff: float = STIFF,
+    stiff: tuple[float, float] = STIFF,
 ) -> JointWay | NoWay:
     """The way from one visit to the next, or why there is none.
 
@@ -191,7 +191,7 @@ def leg(
         ends: of configurations on the straight beginning and end.
         pace: limits of the coordinate and the tool.
         seed: of the random search.
-        stiff: share of the straight beginning and end that is not rounded.
+        stiff: shares of the straight beginning and end that are not rounded.
     """
     limits = chain.limits.low, chain.limits.high
     middle = transfer(out[-1], into[0], clearance, limits, seed)

@@ -12,7 +12,7 @@ import numpy as np
 
 from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
 from factory.apps.arms.arming import RAILS
-from factory.apps.arms.arrangement import CARRIER, Arrangement, feeder_name, placed_name
+from factory.apps.arms.arrangement import CARRIER, Arrangement, Rise, feeder_name, placed_name
 from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, down
 from factory.apps.arms.certifying import uncertified
@@ -56,6 +56,19 @@ class ArmTour:
     brings: JointWay
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightEnd:
+    """A straight end of a way.
+
+    Attributes:
+        rows: configurations along it, from the visit (k, n) [rad, m].
+        share: of it that is not rounded, from the visit.
+    """
+
+    rows: Array
+    share: float
+
+
 class ArmPlanner:
     """Plans the legs of one arm.
 
@@ -95,10 +108,10 @@ class ArmPlanner:
             before, (_, _, left) = self.labels[number - 1], visits[number - 1]
             out = self._line(left, cell.leaves(before), before)
             over = self._line(taken, cell.over_well, label)
-            goes = self._leg(out, over[::-1], "", before, label)
+            goes = self._leg(out, over, "", before, label)
             self._hold(label, yaw)
             into = self._line(placed, cell.rises(label), label)
-            brings = self._leg(over, into[::-1], label, label, label)
+            brings = self._leg(over, into, label, label, label)
             tours.append(ArmTour(label, ToolGrip(cell.tip[label], yaw), goes, brings))
         return tours
 
@@ -146,7 +159,7 @@ class ArmPlanner:
             (np.tile(placed, (len(angles), 1)), turns),
             clearance,
             np.zeros(len(self.chain)),
-            cell.over_well,
+            cell.over_well.length,
         )
         if len(options.pairs):
             return options.pairs, options.grips
@@ -156,7 +169,7 @@ class ArmPlanner:
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
     ) -> Diagnostic:
         position = self.cell.factory.by_label[label].position
-        for up in (0.0, self.cell.over_well):
+        for up in (0.0, self.cell.over_well.length):
             for place in places:
                 why = diagnose_reach(self.chain, place + np.array([0.0, 0.0, up]), turn)
                 if why is not None:
@@ -166,7 +179,7 @@ class ArmPlanner:
         if blocked:
             message += f": {self.scene.say(blocked.pair)} are in each other's way"
         else:
-            message += f" and goes straight up by {self.cell.over_well * 1e3:.0f} mm at both ends"
+            message += f" and goes straight up by {up * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
     def _later(self, label: str) -> set[str]:
@@ -184,16 +197,19 @@ class ArmPlanner:
             self.cell.arm_of, key=lambda one: factory.postorder[factory.by_label[one].index]
         )
 
-    def _line(self, q: Array, length: float, label: str) -> Array:
-        """Configurations along a straight line up from a visit (k, n)."""
+    def _line(self, q: Array, rise: Rise, label: str) -> StraightEnd:
+        """The straight line up from a visit."""
+        length = rise.length
         rows, good = straight_line(self.chain, q[None], retreat(self.chain, q[None]), length)
         if not good[0]:
             message = f"{self.name} cannot go straight up from '{label}' by {length * 1e3:.0f} mm"
             position = self.cell.factory.by_label[label].position
             raise RunError(Diagnostic("Unreachable", message, position, RAILS))
-        return np.asarray(rows[0])
+        return StraightEnd(np.asarray(rows[0]), rise.straight / length)
 
-    def _leg(self, out: Array, into: Array, label: str, before: str, after: str) -> JointWay:
+    def _leg(
+        self, out: StraightEnd, into: StraightEnd, label: str, before: str, after: str
+    ) -> JointWay:
         """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
         scene, every = self.scene, self._later("")
         well = {f"'{after}'", feeder_name(after), *every}
@@ -201,11 +217,12 @@ class ArmPlanner:
         first, last = (well, pile) if label else (pile, well)
         way = leg(
             self.chain,
-            out,
-            into,
+            out.rows,
+            into.rows[::-1],
             lambda q: scene.margins(q, label, NEED, {f"'{label}'", *every}),
             lambda q: scene.margins(q, label, AT_END, {*first, *last}, held=False),
             self.pace,
+            stiff=(out.share, into.share),
         )
         blocked = way if isinstance(way, NoWay) else None
         if isinstance(way, JointWay):

@@ -127,9 +127,6 @@ STEP = 0.02
 ENOUGH = 0.12
 """A ring that is wider than this is wide enough; among narrower ones the widest is taken [m]."""
 
-NEARER = 0.41
-"""Where in its ring an arm has the station, as a share of the ring's width."""
-
 
 @dataclass(frozen=True, slots=True)
 class Ring:
@@ -139,19 +136,23 @@ class Ring:
         base: height of its base [m].
         inner: least distance from its axis [m].
         outer: greatest distance from its axis [m].
+        spread: how far from the station it places parts [m].
     """
 
     base: float
     inner: float
     outer: float
+    spread: float = 0.0
 
-    @property
-    def near(self) -> float:
-        """Distance of the station from its axis [m]."""
-        return self.inner + NEARER * (self.outer - self.inner)
+    def at(self, share: float) -> float:
+        """The distance from its axis at a share of the ring's width, from where all places about it
+        are in the ring, if that is wide enough [m]."""
+        width = self.outer - self.inner
+        spread = min(self.spread, width / 2)
+        return self.inner + min(max(share * width, spread), width - spread)
 
 
-def ring_of(chain: SerialChain, low: float, high: float) -> Ring | None:
+def ring_of(chain: SerialChain, low: float, high: float, spread: float = 0.0) -> Ring | None:
     """The ring in which an arm comes with its tool down to all heights between two; None where
     there is none.
 
@@ -159,6 +160,7 @@ def ring_of(chain: SerialChain, low: float, high: float) -> Ring | None:
         chain: the arm.
         low: least height of the tip of the tool above the floor [m].
         high: greatest height [m].
+        spread: how far from the station it places parts [m].
     """
     radii = np.arange(STEP, chain.length, STEP)
     turn = np.diag([1.0, -1.0, -1.0])
@@ -174,10 +176,10 @@ def ring_of(chain: SerialChain, low: float, high: float) -> Ring | None:
                 for q in rows
             ]
         inner, outer = _longest(reached)
-        ring = Ring(base, float(radii[inner]), float(radii[outer]))
+        ring = Ring(base, float(radii[inner]), float(radii[outer]), spread)
         if outer > inner and (best is None or ring.outer - ring.inner > best.outer - best.inner):
             best = ring
-        if best is not None and best.outer - best.inner > ENOUGH:
+        if best is not None and best.outer - best.inner > ENOUGH + 2 * spread:
             return best
     return best
 

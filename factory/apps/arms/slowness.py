@@ -19,8 +19,8 @@ STEP, FEWEST, MOST = 0.0015, 600, 4000
 
 KNOTS = 200
 
-STIFF = 0.47
-"""Share of straight beginnings and ends that is not rounded: 40 of 85 mm."""
+STIFF = 0.47, 0.47
+"""Shares of the straight beginning and end that are not rounded: 40 of 85 mm."""
 
 RESERVE = 0.93, 0.98
 """Shares of acceleration and speed that the passes use: the spline differs from its samples."""
@@ -77,7 +77,7 @@ def way_through(
     middle: Array,
     into: Array,
     pace: WayLimits,
-    stiff: float = STIFF,
+    stiff: tuple[float, float] = STIFF,
     rounding: float = 0.1,
 ) -> JointWay:
     """The way along a straight beginning, a transfer and a straight end, with (∗).
@@ -88,7 +88,7 @@ def way_through(
         middle: those of a polyline from the last of `out` to the first of `into` (l, n).
         into: configurations along the end, in the order of the way (k, n).
         pace: limits of the coordinate and the tool.
-        stiff: share of the straight beginning and end that is not rounded.
+        stiff: shares of the straight beginning and end that are not rounded.
         rounding: greatest half width of the average that rounds corners [s at the joints' full
             speed].
     """
@@ -100,11 +100,12 @@ def way_through(
     for part, at in ((out, time[: len(out)]), (into, time[len(rows) - len(into) :])):
         inside = (t >= at[0]) & (t <= at[-1])
         path[inside] = JointWay(at - at[0], part).at(t[inside] - at[0])[0]
-    ends = time[round(stiff * (len(out) - 1))], time[-1 - round(stiff * (len(into) - 1))]
+    at = stiff[0] * (len(out) - 1), len(rows) - 1 - stiff[1] * (len(into) - 1)
+    first, last = np.interp(at, np.arange(len(rows)), time).tolist()
     for _ in range(2):
-        half = np.clip(np.minimum(t - ends[0], ends[1] - t) / 2, 0.0, rounding)
+        half = np.clip(np.minimum(t - first, last - t) / 2, 0.0, rounding)
         path = box_average(t, path, half)
-    return enforce_limits(_through_samples(chain, t, path, ends, pace), chain, pace)
+    return enforce_limits(_through_samples(chain, t, path, (first, last), pace), chain, pace)
 
 
 def _through_samples(

@@ -39,10 +39,12 @@ Corner = Array
 
 @dataclass(frozen=True, slots=True)
 class PadPlace:
-    """The middle of a pad's lower face (3,), in the frame of the product, and its radius [m]."""
+    """The middle of a pad's lower face (3,), in the frame of the product, its radius [m], and
+    whether the part is level under all of it."""
 
     at: Array = field(repr=False)
     radius: float
+    level: bool = False
 
 
 def pad_place(
@@ -50,13 +52,14 @@ def pad_place(
     heading: tuple[float, float],
     taken: tuple[Corner, Corner] | None = None,
     largest: float = WIDEST,
+    share: float = SHARE,
 ) -> PadPlace:
     """The place of a pad on a part that leaves with a heading, a horizontal direction along an
-    axis. The pad has the `largest` radius [m], stays out of the rectangle that is `taken`, and is
-    smaller if necessary. Among equal places the one nearest to the centre of mass is chosen; places
+    axis. The pad has the `largest` radius [m], but at most that `share` of the part's least extent in
+    plan, stays out of the rectangle that is `taken`, and is smaller if necessary. Among equal places the one nearest to the centre of mass is chosen; places
     with material under the middle are preferred."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
-    widest = max(min(largest, SHARE * float((high - low).min())), NARROWEST)
+    widest = max(min(largest, share * float((high - low).min())), NARROWEST)
     faces, drawn = Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))
     for radius in (widest, widest / 2, widest / 4):
         places = _grid(solid, radius)
@@ -77,7 +80,7 @@ def pad_place(
         empty = top - drawn.height_in(place - radius / 4, place + radius / 4)
         off = top - drawn.height_in(*under), min(empty, radius) if empty > EVEN else 0.0
         if off[0] < EVEN and not off[1]:
-            return _at(place, top, radius)
+            return PadPlace(_at(place, top, radius).at, radius, level=True)
         if off < worst:
             best, worst = _at(place, top, radius), off
     if best is None:  # of a part that is nowhere level the highest place
