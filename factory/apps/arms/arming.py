@@ -1,13 +1,14 @@
-"""From a product to the factory of a cell: a carrier that brings the first part along, and an arm
-that places all others on it.
+"""From a product to the factory of a cell: carriers that bring first parts along, and arms that
+place all others on them.
 
-Every join becomes a `place`, whose second input an arm lowers. The robots that bring those are one
-arm, whose tours follow each other in the order of the joins, so the net is live (Theorem 18).
+Every join becomes a `place`, whose second input an arm lowers. A sub-assembly is built on a carrier
+of its own, from which an arm takes it (`pick`). The robots that bring what is placed are one arm or
+two, whose tours follow each other in the order of the joins, so the net is live (Theorem 18).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
@@ -31,6 +32,32 @@ place = (R, j, ~, <a; b>, F) where
 """
 """The operation in which an arm of a kind lowers what it has fetched onto what a carrier brings."""
 
+PICK = """
+pick = (R, j, ~, <a; b>, F) where
+  R = < dot, {kind} >;
+  j = 2;
+  ~ = {{}};
+  <a; b> = < LAB1, nopart; nopart, LAB2 >;
+  F = navigation on W to ( A1 + 2r, B2 ) within eps;
+"""
+"""The operation in which it takes a sub-assembly from a carrier, which stands by then."""
+
+SHOW = """
+show = (R, j, ~, <a; b>, F) where
+  R = < dot >;
+  j = 1;
+  ~ = {{}};
+  <a; b> = < LAB1; LAB2 >;
+  F = navigation on W to ( A1 + 2r ) within eps;
+"""
+"""The operation in which a carrier brings a sub-assembly from a tool to where an arm takes it."""
+
+TAKEN, SHOWN = "taken", "shown"
+"""What is added to the label of a sub-assembly."""
+
+TRIES = 12
+"""How many other orders of the inputs of joins are tried."""
+
 
 def robot_type(model: ArmModel) -> RobotType:
     """The robot type of an arm: a dot whose axis moves all joints of its chain."""
@@ -41,23 +68,98 @@ def robot_type(model: ArmModel) -> RobotType:
 
 def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
     """The project in which some arms of a kind place all parts but the first, by turns. Raises
-    InputError (NoCell) where two sub-assemblies are joined."""
+    InputError (NoCell) for a mix, and for two arms with sub-assemblies."""
     if project.pag.mix is not None:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
-    kind, catalogue, pag = model.kind, project.catalogue, _placing(project.pag)
+    orders = dict[str, tuple[str, ...]]()
+    made = _placing(project, model, orders)
+    stuck, tries = _not_lowered(made), TRIES
+    for node, part in [*stuck.values()]:
+        inputs = orders.get(node, _piles_first(project.pag, node))
+        at = inputs.index(part)
+        for place in range(at - 1, 0, -1):
+            rest = [label for label in inputs if label != part]
+            moved = {**orders, node: (*rest[:place], part, *rest[place:])}
+            tries -= 1
+            if tries < 0:
+                break
+            other = _placing(project, model, moved)
+            if len(left := _not_lowered(other)) < len(stuck):
+                made, stuck, orders = other, left, moved
+                break
+    piles = [node for node in made.pag.nodes if node.operation == "pick"]
+    if arms > 1 and piles:
+        message = f"'{piles[0].inputs[0]}' is a sub-assembly: one arm makes what has such"
+        hint = f"one arm: --arm {model.kind}; {RAILS}"
+        raise InputError(Diagnostic("NoCell", message, piles[0].position, hint))
+    crew = tuple(_crew(made.compiled, model.kind, arms))
+    return made.with_plan(Plan(turns=(crew,), lifts=frozenset()))
+
+
+def on_rails(project: Project, pag: PAG, pile: str) -> Project:
+    """The project that makes a sub-assembly of a cell's PAG, or all of it, on rails, with an
+    `insert` for each `place`."""
+    sources = {node.label: node.inputs[0] for node in pag.nodes if node.operation in MOVES}
+    nodes = dict[str, Assembly]()
+    for node in pag.nodes:
+        if node.label not in sources:
+            inputs = tuple(_source(sources, label) for label in node.inputs)
+            operation = "insert" if node.operation == "place" else node.operation
+            nodes[node.label] = replace(
+                node, operation=operation, inputs=inputs, input_positions=()
+            )
+    kept, stack = set[str](), [_source(sources, pile)]
+    while stack:
+        kept.add(label := stack.pop())
+        stack += nodes[label].inputs
+    chosen = tuple(node for node in nodes.values() if node.label in kept)
+    return project.with_pag(replace(pag, root=_source(sources, pile), nodes=chosen, count=None))
+
+
+MOVES = "pick", "show"
+"""Operations that a cell adds to a PAG."""
+
+
+def _source(sources: Mapping[str, str], label: str) -> str:
+    """What a label is of that is only moved."""
+    while label in sources:
+        label = sources[label]
+    return label
+
+
+def _placing(project: Project, model: ArmModel, orders: Mapping[str, Sequence[str]]) -> Project:
+    """The project with a place for each join; `orders` of inputs other than the usual one."""
+    kind, catalogue = model.kind, project.catalogue
+    pag = replace(project.pag, nodes=tuple(_nodes(project.pag, orders)))
     types = {**catalogue.types, kind: robot_type(model)}
-    templates = {**project.templates, "place": read_template(PLACE.format(kind=kind), f"{kind}.op")}
+    texts = {"place": PLACE, "pick": PICK, "show": SHOW}
+    added = {
+        name: read_template(text.format(kind=kind), f"{kind}.op") for name, text in texts.items()
+    }
     lowered = {node.label: node.inputs[-1] for node in pag.nodes if len(node.inputs) > 1}
-    made = replace(
-        project, pag=pag, templates=templates, catalogue=Catalogue(types), lowered=lowered
+    return replace(
+        project,
+        pag=pag,
+        templates={**project.templates, **added},
+        catalogue=Catalogue(types),
+        lowered=lowered,
     )
-    return made.with_plan(Plan(turns=(tuple(_crew(made.compiled, kind, arms)),), lifts=frozenset()))
+
+
+def _not_lowered(project: Project) -> dict[str, tuple[str, str]]:
+    """The joins whose last input cannot be lowered: the node and the input of the PAG, by label."""
+    approaches, stuck = project.approaches, dict[str, tuple[str, str]]()
+    for node in project.pag.nodes:
+        approach = approaches.get(node.label)
+        if len(node.inputs) > 1 and approach and approach.lowered != node.inputs[-1]:
+            stuck[node.label] = node.label.partition("/")[0], node.inputs[-1].partition("/")[0]
+    return stuck
 
 
 def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
-    """The robot (index) that does the tour of each robot of a factory: the carrier its own, arms by
-    turns what is placed."""
+    """The robot (index) that does the tour of each robot of a factory: carriers and tools their
+    own, arms by turns what is placed."""
     others = [robot.index for robot in factory.robots if robot.type != kind]
     placing = [robot for robot in factory.robots if robot.type == kind]
     order = sorted(placing, key=lambda robot: factory.postorder[robot.operations[-1]])
@@ -69,26 +171,36 @@ def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
             yield others.index(robot.index)
 
 
-def _placing(pag: PAG) -> PAG:
-    """The tree with a place for each join, the sub-assembly first."""
-    return replace(pag, nodes=tuple(_nodes(pag)))
+def _piles_first(pag: PAG, label: str) -> tuple[str, ...]:
+    """The inputs of a node, sub-assemblies first."""
+    inputs = pag[label].inputs
+    return tuple(sorted(inputs, key=lambda one: not pag[one].inputs))
 
 
-def _nodes(pag: PAG) -> Iterator[Assembly]:
+def _nodes(pag: PAG, orders: Mapping[str, Sequence[str]]) -> Iterator[Assembly]:
     """The nodes with two inputs at most: `x = mate ( a, b, c )` is placed one by one."""
     for node in pag.nodes:
         if len(node.inputs) < 2:
             yield node
             continue
-        piles = [label for label in node.inputs if pag[label].inputs]
-        if len(piles) > 1:
-            message = f"'{node.label}' joins the sub-assemblies {', '.join(map(repr, piles))}"
-            message = f"{message}; a cell adds part by part"
-            raise InputError(Diagnostic("NoCell", message, node.position, RAILS))
-        pile, *parts = (*piles, *(label for label in node.inputs if label not in piles))
+        pile, *parts = orders.get(node.label, _piles_first(pag, node.label))
         for number, part in enumerate(parts, start=2):
             last = number == len(node.inputs)
             label = node.label if last else f"{node.label}/{number}"
+            if pag[part].inputs:
+                steps = [(f"{part}/{TAKEN}", "pick")]
+                if len(pag[part].inputs) == 1:
+                    steps.insert(0, (f"{part}/{SHOWN}", "show"))
+                for step, operation in steps:
+                    yield replace(
+                        node,
+                        label=step,
+                        operation=operation,
+                        inputs=(part,),
+                        input_positions=(),
+                        parameters=(),
+                    )
+                    part = step
             yield replace(
                 node, label=label, operation="place", inputs=(pile, part), input_positions=()
             )

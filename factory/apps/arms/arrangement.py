@@ -1,38 +1,26 @@
-"""Where things stand in a cell: the carrier's line and its station, arms on either side of it, and
-the feeders of each arm on a circle round its base."""
+"""Where things stand in a cell: the carriers' lines and their stations, arms on either side of the
+first, and the feeders of each arm on a circle round its base."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import asin, cos, pi, sin
 
 import numpy as np
 
-from factory.api import (
-    Array,
-    Diagnostic,
-    Factory,
-    Guidepath,
-    Layout,
-    Operation,
-    Product,
-    RunError,
-    Solid,
-)
+from factory.api import Array, Diagnostic, Factory, Layout, Product, RunError, Solid
 from factory.apps.arms.arming import RAILS
-from factory.apps.arms.body import PAD_RADIUS, PEDESTAL, STEM, Stand
+from factory.apps.arms.body import PEDESTAL, STEM, Stand
+from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, Well, down, shown_height, well_of
 from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.lines import LANE, Line, line_of, overlap
 from factory.apps.arms.reach import Ring, ring_of
-from factory.apps.arms.scene import StandingBox
-from factory.apps.arms.tools import Tool, tools_of, works_at
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
-from factory.floor.geometry.suction import PadPlace, pad_place
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box
+from factory.floor.layout.guidepath import Box, Point2
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""
@@ -40,14 +28,14 @@ CLOSER = 0.02
 APART = 0.02
 """Between what stands beside each other [m]."""
 
-LANE = 0.32
-"""From the station to either end of the carrier's line, without the product's length [m]."""
-
 FULL = pi - 0.1
 """Angle from the station up to which there are feeders on either side of an arm [rad]."""
 
-SHARES = 0.45, 0.35, 0.25
-"""Radii of pads as shares of a part's least extent in plan that are tried."""
+TURN = 0.04
+"""Between the angles that are tried for a feeder or a line [rad]."""
+
+FAR_OFF = 9.0
+"""Longer than any line [m]."""
 
 ABOVE = 0.018
 """How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""
@@ -82,53 +70,58 @@ class Arrangement:
     """The places in a cell.
 
     Attributes:
-        factory: of the carrier, tools that work on what it carries, and arms.
-        rails: the layout of the same product on rails, whose carrier's line and hand it takes.
+        factory: of carriers, tools that work on what these carry, and arms.
+        rails: by carrier (index), the layout on rails of what it brings, whose line and hand it
+            takes; the first brings the product.
         chain: the arms, to the tip of their tools.
         aside: least angle between the station and a feeder, as its arm sees them [rad].
         far: how far an arm stands from the station, as a share of the width of its ring.
+        size: of the tools' pads, the number of those that some burden has room for.
     """
 
     factory: Factory
-    rails: Layout
+    rails: Mapping[int, Layout]
     chain: SerialChain
     aside: float = 0.0
     far: float = 0.41
+    size: int = 0
 
     @property
     def product(self) -> Product:
         """The solids."""
-        return self.rails.product
+        return self.rails[0].product
+
+    @property
+    def clearance(self) -> float:
+        """Between what stands [m]."""
+        return self.rails[0].clearance
 
     @cached_property
     def arms(self) -> tuple[int, ...]:
         """The arms (index)."""
         return tuple(robot.index for robot in self.factory.robots if robot.body.first.moves)
 
-    @property
-    def others(self) -> range:
-        """All robots but the carrier (index)."""
-        return range(1, len(self.factory.robots))
-
-    @cached_property
-    def tools(self) -> dict[int, Tool]:
-        """The tools by index."""
-        room = [well.feeder.housing for well in self.wells.values()]
-        room += map(_round, self.stands.values())
-        solids = (self.product.solids[label] for label in self.arm_of)
-        widest = max(float(np.linalg.norm((one.high - one.low)[:2])) for one in solids)
-        near = float(self.half[0]) + widest / 2 + APART
-        return tools_of(self.factory, self.rails, self.station[0], near, room)
-
     def labels(self, arm: int) -> list[str]:
-        """The parts that an arm takes, in the order of its program."""
+        """What an arm takes, in the order of its program."""
         operations = self.factory.operations
         return [operations[tour[0]].label for tour in self.factory.tours[arm]]
 
     @cached_property
     def arm_of(self) -> dict[str, int]:
-        """The arm (index) that takes each part."""
+        """The arm (index) that takes each part and sub-assembly."""
         return {label: arm for arm in self.arms for label in self.labels(arm)}
+
+    @cached_property
+    def burdens(self) -> dict[str, Burden]:
+        """What the arms bring."""
+        tours = (tour[0] for arm in self.arms for tour in self.factory.tours[arm])
+        every = (burden_of(self.factory, self.product, first) for first in tours)
+        return {burden.label: burden for burden in every}
+
+    def names(self, label: str) -> list[str]:
+        """All labels of what an arm brings: of the operations that change nothing of it, too."""
+        contents, parts = self.factory.contents, {*self.burdens[label].parts}
+        return [o.label for o in self.factory.making if {*contents[o.label]} == parts]
 
     @cached_property
     def half(self) -> Array:
@@ -136,34 +129,69 @@ class Arrangement:
         return np.asarray((self.product.high - self.product.low)[:2] / 2)
 
     @cached_property
+    def station(self) -> Point2:
+        """The product's middle at the station of the first line [m]."""
+        path = self.rails[0].guidepaths[0]
+        return path.middle(path.reach + self.lane)
+
+    @cached_property
     def lane(self) -> float:
         """From the station to the outfeed [m]."""
         return round(LANE + 2 * float(self.half[0]), 3)
 
     @cached_property
-    def line(self) -> Guidepath:
-        """The carrier's guidepath."""
-        behind = [self.station[0] - tool.box[0] for tool in self.tools.values()]
-        behind = [self.lane, *(far + 2 * float(self.half[0]) for far in behind)]
-        return replace(self.rails.guidepaths[0], travel=round(self.lane + max(behind), 3))
+    def lines(self) -> dict[int, Line]:
+        """The lines by carrier (index)."""
+        lines, room = {**self._lines}, [well.feeder.housing for well in self.wells.values()]
+        room += map(pedestal, self.stands.values())
+        for carrier, line in self._lines.items():
+            brought = (b for b in self.burdens.values() if b.onto == carrier)
+            wide = max(float(np.linalg.norm((b.high - b.low)[:2])) for b in brought)
+            others = [other for n, other in lines.items() if n != carrier]
+            boxes = [box for other in others for box in (other.swept, *other.tool_boxes)]
+            lines[carrier] = line.with_tools(wide / 2 + APART, [*room, *boxes])
+        return lines
 
     @cached_property
-    def station(self) -> tuple[float, float]:
-        """The product's middle at the station [m]."""
-        path = self.rails.guidepaths[0]
-        return path.middle(path.reach + self.lane)
+    def _lines(self) -> dict[int, Line]:
+        """The lines, their tools not placed yet: those of sub-assemblies end behind the arm, on its
+        circle. Raises RunError (Layout) where there is no room for one."""
+        lines = dict[int, Line]()
+        for carrier, draft in self.drafts.items():
+            if carrier:
+                lines[carrier] = self._beside(draft, [*map(_behind, lines.values())])
+            else:
+                lines[carrier] = replace(draft, station=self.station, ahead=self.lane)
+        return lines
 
-    def stop(self, operation: Operation) -> float:
-        """How far from its feeder the carrier stands in an operation [m]."""
-        at = works_at(self.tools, operation)
-        at = self.station[0] if at is None else at
-        return round(at - self.line.middle(self.line.length)[0], 6)
+    @cached_property
+    def drafts(self) -> dict[int, Line]:
+        """The lines by carrier (index), wherever they are."""
+        return {
+            carrier: line_of(self.factory, carrier, self.product, rails)
+            for carrier, rails in self.rails.items()
+        }
+
+    def _beside(self, line: Line, taken: Sequence[Box]) -> Line:
+        """A line where it is clear of others."""
+        stand, radius = self.stands[self.arms[0]], self.near + CLOSER
+        taken = [*taken, pedestal(stand)]
+        for angle in np.arange(TURN, FULL, TURN).tolist():
+            x, y, _ = stand.place
+            turned = stand.yaw - angle
+            u, v = line.off
+            at = x + radius * cos(turned) - u, y + radius * sin(turned) - v
+            placed = replace(line, station=(round(at[0], 6), round(at[1], 6)))
+            if not any(overlap(_behind(placed), box) for box in taken):
+                return placed
+        message = f"the line of {line.name} has no room at its arm"
+        raise RunError(Diagnostic("Layout", message, None, f"smaller parts; {RAILS}"))
 
     @cached_property
     def show(self) -> float:
         """Height at which the bottoms of parts are shown [m]."""
-        solids = [self.product.solids[label] for label in self.arm_of]
-        return shown_height(solids, self.rails.clearance)
+        fed = (b.solids[0] for b in self.burdens.values() if b.source is None)
+        return shown_height([*fed], self.clearance)
 
     @cached_property
     def ring(self) -> Ring:
@@ -171,9 +199,11 @@ class Arrangement:
         Raises RunError (Unreachable) where their tools do not come up and down far enough."""
         tips, low = list[float](), float(self.product.low[2])
         for label, tip in self.tip.items():
-            shown = self.show + float(tip[2] - self.product.solids[label].low[2])
-            placed = PAYLOAD + float(tip[2]) - low
-            tips += [shown, placed, shown + self.over_well.length]
+            burden, placed = self.burdens[label], PAYLOAD + float(tip[2]) - low
+            fed = burden.source is None
+            shown = self.show + float(tip[2] - burden.low[2]) if fed else placed
+            tips += [shown, placed, shown + self.enters(label).length]
+            tips += [shown + self.exits(label).length]
             tips += [placed + self.rises(label).length, placed + self.leaves(label).length]
         aside = (tip[:2] - self.product.middle[:2] for tip in self.tip.values())
         spread = max(float(np.linalg.norm(off)) for off in aside)
@@ -208,55 +238,68 @@ class Arrangement:
     @cached_property
     def wells(self) -> dict[str, Well]:
         """The feeders of all arms."""
-        room = self.product, self.show, self.rails.clearance
-        return {
-            label: well_of(self.product.solids[label], at, *room)
-            for arm in self.arms
-            for label, at in self._places(arm)
-        }
+        return {label: well for arm in self.arms for label, well in self._places(arm)}
 
-    def _places(self, arm: int) -> Iterator[tuple[str, tuple[float, float]]]:
-        """Where the parts of an arm are shown: on a circle round it, the first ones next to the
-        carrier's line; to the right and left of the station in turn, but with another arm opposite
-        to the right as long as there is room: so the ways of both cross at the station alone."""
+    def _places(self, arm: int) -> Iterator[tuple[str, Well]]:
+        """The feeders of an arm: on a circle round it, the first ones next to the carrier's line;
+        to the right and left of the station in turn, but with another arm opposite to the right as
+        long as there is room: so the ways of both cross at the station alone."""
         stand, radius = self.stands[arm], self.near + CLOSER
-        beside = max(float(self.half[1]), self.factory.carriage / 2) + self.rails.clearance
-        angles = [0.0, 0.0]
-        for number, label in enumerate(self.labels(arm)):
+        beside = max(float(self.half[1]), self.factory.carriage / 2) + self.clearance
+        angles, taken = [0.0, 0.0], [_behind(line) for n, line in self._lines.items() if n]
+        fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
+        for number, label in enumerate(fed):
             solid = self.product.solids[label]
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
             room = (self.near - beside - wide) / radius
             first = pi / 2 - asin(max(-1.0, min(1.0, room)))
             first = max(first, self.aside)
-            side = number % 2
+            preferred = number % 2
             if len(self.arms) > 1:
-                side = int(max(angles[0] + pitch, first) + pitch > FULL)
-            angle = max(angles[side] + pitch, first)
-            angles[side] = angle + pitch
-            if angles[side] > FULL:
+                preferred = int(max(angles[0] + pitch, first) + pitch > FULL)
+            for side in (preferred, 1 - preferred):
+                angle = max(angles[side] + pitch, first)
+                while angle + pitch <= FULL:
+                    well = self._well(solid, stand, radius, angle if side else -angle)
+                    if not any(overlap(well.feeder.housing, box) for box in taken):
+                        break
+                    angle += TURN
+                if angle + pitch <= FULL:
+                    break
+            else:
                 message = f"the feeder of '{label}' has no room round its arm"
                 hint = "more arms, smaller parts, or rails: leave out --arm"
                 raise RunError(Diagnostic("Layout", message, None, hint))
-            turned = stand.yaw + (angle if side else -angle)
-            x, y, _ = stand.place
-            yield label, (x + radius * cos(turned), y + radius * sin(turned))
+            angles[side] = angle + pitch
+            yield label, well
+
+    def _well(self, solid: Solid, stand: Stand, radius: float, angle: float) -> Well:
+        """The feeder of a part on a circle round an arm, at an angle from the station [rad]."""
+        x, y, _ = stand.place
+        turned = stand.yaw + angle
+        at = x + radius * cos(turned), y + radius * sin(turned)
+        return well_of(solid, at, self.product, self.show, self.clearance)
 
     @cached_property
-    def pads(self) -> dict[str, PadPlace]:
-        """Where a pad is on each part, and how large it may be there."""
-        return {label: _largest_pad(self.product.solids[label]) for label in self.arm_of}
+    def sizes(self) -> list[float]:
+        """The radii of pads for which there is room on some burden [m]."""
+        return sorted({round(float(burden.pad.radius), 4) for burden in self.burdens.values()})
 
-    @cached_property
+    @property
     def pad(self) -> float:
-        """Radius of the pads of the arms' tools: there is room for them on every part [m]."""
-        return min(float(pad.radius) for pad in self.pads.values())
+        """Radius of the pads of the arms' tools, which may be larger than what they hold [m]."""
+        return self.sizes[self.size]
+
+    def covered(self, label: str) -> float:
+        """Radius of what a pad covers of a burden [m]."""
+        return min(self.pad, float(self.burdens[label].pad.radius))
 
     @cached_property
     def tip(self) -> dict[str, Array]:
         """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
         off = np.array([0.0, 0.0, GAP - SUCTION_GAP])
-        return {label: np.asarray(pad.at + off) for label, pad in self.pads.items()}
+        return {label: np.asarray(b.pad.at + off) for label, b in self.burdens.items()}
 
     @property
     def _foot(self) -> Array:
@@ -265,14 +308,17 @@ class Arrangement:
         return np.array([*self.product.middle[:2], self.product.low[2] - PAYLOAD])
 
     def shown(self, label: str) -> Array:
-        """How far a part is from its place in the product's frame as it is shown (3,) [m]."""
+        """How far from its place in the product's frame what an arm brings is as the arm takes it
+        (3,) [m]."""
+        if (source := self.burdens[label].source) is not None:
+            return self.placed(source)
         well = self.wells[label]
         return np.array([*well.place, well.elevation]) - self._foot
 
-    @property
-    def placed(self) -> Array:
-        """How far a part is from its place in the product's frame at the station (3,) [m]."""
-        return np.array([*self.station, 0.0]) - self._foot
+    def placed(self, carrier: int) -> Array:
+        """How far a part is from its place in the product's frame at the station of a line
+        (3,) [m]."""
+        return np.array([*self.lines[carrier].station, 0.0]) - self._foot
 
     def local(self, arm: int, place: Array) -> Array:
         """A place of the world in the frame of an arm's base (3,) [m]."""
@@ -286,138 +332,61 @@ class Arrangement:
         """Height of the product's top [m]."""
         return PAYLOAD + float(self.product.high[2] - self.product.low[2])
 
+    def _height(self, z: float) -> float:
+        """Height of a place of the product's frame on a carrier [m]."""
+        return PAYLOAD + z - float(self.product.low[2])
+
     def rises(self, label: str) -> Rise:
-        """How a part comes straight down to its place, from where a carrier may still come and
-        go."""
-        solid, o = self.product.solids[label], self.factory.by_label[label]
-        bottom = PAYLOAD + float(solid.low[2] - self.product.low[2])
-        parent = self.factory.operations[self.factory.parents[o.index]]
-        stroke = parent.approach.stroke if parent.approach else 0.0
-        return Rise.of(max(stroke, self.top - bottom + ABOVE))
+        """How what an arm brings comes straight down to its place, from where a carrier may still
+        come and go."""
+        burden = self.burdens[label]
+        stroke = burden.join.approach.stroke if burden.join.approach else 0.0
+        bottom = self._height(float(burden.low[2]))
+        return Rise.of(max(stroke, self.drafts[burden.onto].top - bottom + ABOVE))
 
     def leaves(self, label: str) -> Rise:
-        """How the empty tool goes straight up from where it has placed a part."""
-        tip = PAYLOAD + float(self.tip[label][2] - self.product.low[2])
-        return Rise.of(self.top + ABOVE - tip)
+        """How the empty tool goes straight up from where it has placed something."""
+        tip = self._height(float(self.tip[label][2]))
+        return Rise.of(self.drafts[self.burdens[label].onto].top + ABOVE - tip)
 
-    @cached_property
-    def over_well(self) -> Rise:
-        """How the tool goes straight up from a feeder."""
-        length = max(OVER_WELL, self.top + 2 * ABOVE - self.show)
-        return Rise(length / 2, length)
+    def enters(self, label: str) -> Rise:
+        """How the empty tool comes straight down to what it takes."""
+        source = self.burdens[label].source
+        if source is None:
+            length = max(OVER_WELL, self.top + 2 * ABOVE - self.show)
+            return Rise(length / 2, length)
+        return Rise.of(self.drafts[source].top + ABOVE - self._height(float(self.tip[label][2])))
+
+    def exits(self, label: str) -> Rise:
+        """How it goes straight up with it."""
+        burden = self.burdens[label]
+        if burden.source is None:
+            return self.enters(label)
+        return Rise.of(self.drafts[burden.source].top + ABOVE - self._height(float(burden.low[2])))
 
     def loads(self, label: str) -> list[tuple[Array, Array, Array]]:
-        """The boxes of a part in the tool's frame, held with the tool's angle at 0: place, half
-        sizes, quaternion."""
-        solid = self.product.solids[label]
-        middle, half = (solid.low + solid.high) / 2, (solid.high - solid.low) / 2
-        place = down(0.0).T @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
-        return [(place, half, np.array([0.0, 1.0, 0.0, 0.0]))]
-
-    def obstacles(self, arm: int, bare: Layout) -> Iterator[StandingBox]:
-        """What stands in an arm's way, or may come there while it is on a transfer.
-
-        Args:
-            arm: the arm (index).
-            bare: the layout without legs.
-        """
-        yield StandingBox("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
-        yield self.carrier
-        for label, well in self.wells.items():
-            xlo, xhi, ylo, yhi = well.feeder.housing
-            yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
-            yield from self._part(f"'{label}'", label, self.shown(label))
-        for label in self.product.solids:
-            yield from self._part(placed_name(label), label, self.placed)
-        first = self.factory.first(0).label
-        feeder = feeder_of(bare, first)
-        for name, box, bottom in (
-            ("post", feeder.post, 0.0),
-            ("boom", feeder.boom, feeder.low),
-            ("housing", feeder.housing, feeder.low),
-        ):
-            yield _upright(f"the {name} of '{first}'", box, bottom, feeder.high)
-        for tool in self.tools.values():
-            name = self.factory.robots[tool.robot].name
-            yield _upright(name, tool.box, 0.0, tool.high)
-        yield _upright("the outfeed's shed", bare.shed, 0.0, self.top + 0.06)
-        yield _upright("the outfeed", bare.outfeed, 0.0, self.top)
-        for other, stand in self.stands.items():
-            if other != arm:
-                name = self.factory.robots[other].name
-                yield _upright(f"the base of {name}", _round(stand), 0.0, stand.place[2] + BASE)
-
-    @property
-    def carrier(self) -> StandingBox:
-        """All that the carrier takes with the product on its line."""
-        ends = [self.line.middle(x) for x in (self.line.reach, self.line.length)]
-        low, high = sorted(end[0] for end in ends)
-        side = max(float(self.half[1]), self.factory.carriage / 2)
-        half, y = float(self.half[0]), ends[0][1]
-        back = max(half, self.line.reach + self.factory.carriage / 2)
-        return _upright(CARRIER, (low - back, high + half, y - side, y + side), 0.0, self.top)
-
-    def _part(self, name: str, label: str, off: Array) -> Iterator[StandingBox]:
-        """The boxes round the convex pieces of a part."""
-        solid = self.product.solids[label]
-        ends = [(piece.min(axis=0), piece.max(axis=0)) for piece in solid.pieces if solid.mesh]
-        for low, high in ends or [(solid.low, solid.high)]:
-            xlo, ylo, zlo = (low + off).tolist()
-            xhi, yhi, zhi = (high + off).tolist()
-            yield StandingBox(name, (xlo, ylo, zlo), (xhi, yhi, zhi))
-
-    @cached_property
-    def floor(self) -> Box:
-        """The floor that the cell takes [m]."""
-        xlo, xhi, ylo, yhi = self.rails.floor
-        boxes = [well.feeder.housing for well in self.wells.values()]
-        boxes += map(_round, self.stands.values())
-        boxes += [tool.box for tool in self.tools.values()]
-        c, path = self.rails.clearance, self.rails.guidepaths[0]
-        further = path.middle(path.length)[0] - self.line.middle(self.line.length)[0]
-        behind = xlo - further
-        return (
-            float(min(behind, *(b[0] for b in boxes))) - c,
-            float(max(xhi, *(b[1] for b in boxes))) + c,
-            float(min(ylo, *(b[2] for b in boxes))) - c,
-            float(max(yhi, *(b[3] for b in boxes))) + c,
-        )
+        """The boxes of what an arm brings in the tool's frame, held with the tool's angle at 0:
+        place, half sizes, quaternion."""
+        boxes = list[tuple[Array, Array, Array]]()
+        for solid in self.burdens[label].solids:
+            middle, half = (solid.low + solid.high) / 2, (solid.high - solid.low) / 2
+            place = down(0.0).T @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
+            boxes.append((place, half, np.array([0.0, 1.0, 0.0, 0.0])))
+        return boxes
 
 
 SIDES = (1.0, -1.0)
 """The sides of the line on which arms stand."""
 
-BASE = 0.24
-"""Height of what of an arm stands above its pedestal, at least [m]."""
 
-CARRIER = "the carrier"
-
-
-def feeder_name(label: str) -> str:
-    """What the feeder of a part is called."""
-    return f"the feeder of '{label}'"
-
-
-def placed_name(label: str) -> str:
-    """What a part in the product is called."""
-    return f"'{label}' in the product"
-
-
-def _largest_pad(solid: Solid) -> PadPlace:
-    """The largest pad that a part is level under; one of the least share for none."""
-    for share in SHARES:
-        place = pad_place(solid, (1.0, 0.0), largest=PAD_RADIUS, share=share)
-        if place.level:
-            break
-    return place
-
-
-def _round(stand: Stand) -> Box:
+def pedestal(stand: Stand) -> Box:
     """The square round a pedestal [m]."""
     x, y, _ = stand.place
     return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
 
 
-def _upright(name: str, box: Box, low: float, high: float) -> StandingBox:
-    xlo, xhi, ylo, yhi = map(float, box)
-    return StandingBox(name, (xlo, ylo, float(low)), (xhi, yhi, float(high)))
+def _behind(line: Line) -> Box:
+    """All that a line may take, wherever its tools and its feeder are, with room for what arms bring
+    [m]."""
+    (x, y), (low, high) = line.station, line.band
+    return x - FAR_OFF, x + line.ahead + line.extent[1] + APART, y + low - APART, y + high + APART

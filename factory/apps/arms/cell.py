@@ -54,10 +54,12 @@ class ToolGrip:
     Attributes:
         tip: of the tool, in the product's frame (3,) [m].
         yaw: angle of the tool about the vertical [rad].
+        radius: of what its pad covers there [m].
     """
 
     tip: Array
     yaw: float
+    radius: float
 
     @property
     def turn(self) -> Array:
@@ -150,8 +152,9 @@ class CellChains:
         return (x, y, z + STEM, 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
 
     def hand(self, label: str) -> Hand:
-        x, y, z = map(float, self.grips[label].tip)
-        return Hand("above", ((x, y, z),), next(iter(self.stands.values())).pad)
+        grip = self.grips[label]
+        x, y, z = map(float, grip.tip)
+        return Hand("above", ((x, y, z),), grip.radius)
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

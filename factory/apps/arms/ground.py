@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 from factory.api import Factory, Layout, Product, Project, Settings, usage_error
-from factory.apps.arms.arming import armed
+from factory.apps.arms.arming import armed, on_rails
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.request import Ground
@@ -21,13 +22,14 @@ class CellGround(Ground):
         model: the kind of its arms.
         arms: how many there are.
         source: the project of the product as it was given.
-        rails: that of the same product on rails, from which the carrier's line is taken.
+        rails: by label of what carriers bring, its project on rails, from which the carrier's line
+            is taken; the first is that of the product.
     """
 
     model: ArmModel | None = field(default=None, compare=False, repr=False)
     arms: int = field(default=1, compare=False, repr=False)
     source: Project | None = field(default=None, compare=False, repr=False)
-    rails: Project | None = field(default=None, compare=False, repr=False)
+    rails: Mapping[str, Project] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def reach_bound(self) -> bool:
@@ -39,9 +41,12 @@ class CellGround(Ground):
         from factory.floor.geometry.fused_bodies import repeated
         from factory.floor.mating.mating import judged
 
-        assert self.rails is not None and self.model is not None
+        assert self.model is not None
         factory, product = judged(factory, product), repeated(product, factory)
-        rails = self.rails.with_settings(settings).layout
+        rails = dict[int, Layout]()
+        for label, project in self.rails.items():
+            carrier = factory.by_label[label].carrier
+            rails[carrier] = project.with_settings(settings).layout
         pace = WayLimits(settings.speed, settings.acceleration)
         return laid_out(factory, rails, self.model, pace)
 
@@ -52,8 +57,8 @@ class CellProject(Project):
     @cached_property
     def hands(self) -> Any:
         """The hands of the carrier are chosen on rails; an arm has a tool of its own."""
-        assert isinstance(self.ground, CellGround) and self.ground.rails is not None
-        return self.ground.rails.hands
+        assert isinstance(self.ground, CellGround)
+        return next(iter(self.ground.rails.values())).hands
 
     @cached_property
     def no_grips(self) -> tuple[()]:
@@ -80,11 +85,8 @@ def cell_of(project: Project, model: ArmModel, arms: int) -> CellProject:
     """The project in which so many arms of a kind place all parts but the first. Raises InputError
     (NoCell) for what a cell cannot make."""
     made = armed(project, model, arms)
-    nodes = tuple(
-        replace(node, operation="insert") if len(node.inputs) > 1 else node
-        for node in made.pag.nodes
-    )
-    rails = project.with_pag(replace(project.pag, nodes=nodes))
+    piles = [node.inputs[0] for node in made.pag.nodes if node.operation == "pick"]
+    rails = {pile: on_rails(project, made.pag, pile) for pile in (made.pag.root, *piles)}
     values = {name: getattr(made, name) for name in made.__dataclass_fields__}
     ground = CellGround(model=model, arms=arms, source=project, rails=rails)
     return CellProject(**{**values, "ground": ground})

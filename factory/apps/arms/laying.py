@@ -8,7 +8,7 @@ part, clear of all others (Theorem 20).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -30,11 +30,11 @@ from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.load import Load
 from factory.apps.arms.model import ArmModel
+from factory.apps.arms.obstacles import floor_of
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
 from factory.apps.arms.sharing import SweptArm, clear_share
 from factory.floor.layout.certificate import (
     ARM_BODY,
-    PAYLOAD_BODY,
     POST_BODY,
     Exclusions,
     Precedence,
@@ -42,6 +42,9 @@ from factory.floor.layout.certificate import (
 )
 from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.dimensions import PAYLOADS
+from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.leaving import homes
+from factory.floor.layout.hands.tips import STRONG
 from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
@@ -51,6 +54,9 @@ ASIDE = 0.0, 1.2, 1.8
 
 FAR = 0.41, 0.6, 0.8, 0.2
 """Shares that are tried as `Arrangement.far`."""
+
+SLOWER = 1.2, 1.44, 1.73, 2.07, 2.5, 3.0
+"""How much longer ways are tried where a load is too much for a drive or a pad."""
 
 ELSEWHERE = "Unreachable", "NoWay", "Layout"
 """Errors that an arm may not have where it stands nearer to the station, or farther from it."""
@@ -62,12 +68,14 @@ BEYOND = 0.001
 """How much further than it must an arm has gone where it counts as away [m]."""
 
 
-def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) -> Layout:
+def laid_out(
+    factory: Factory, rails: Mapping[int, Layout], arm: ArmModel, pace: WayLimits
+) -> Layout:
     """The layout of a cell with its certificate.
 
     Args:
-        factory: the carrier and its arms.
-        rails: the layout of the same product on rails.
+        factory: carriers, their tools, and arms.
+        rails: by carrier (index), the layout on rails of what it brings.
         arm: the kind of arm.
         pace: limits of the coordinate along their ways.
 
@@ -86,14 +94,22 @@ def laid_out(factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits) ->
 
 
 def _laid_out_at(
-    factory: Factory, rails: Layout, arm: ArmModel, pace: WayLimits, far: float
+    factory: Factory,
+    rails: Mapping[int, Layout],
+    arm: ArmModel,
+    pace: WayLimits,
+    far: float,
 ) -> Layout:
     """The layout with arms as far from the station as `Arrangement.far` says."""
-    blocked = ""
+    blocked, size = "", 0
     for aside in ASIDE:
         try:
-            cell = Arrangement(factory, rails, with_tool(arm.chain), aside, far)
-            return _with_legs(cell, arm, pace)
+            while True:
+                cell = Arrangement(factory, rails, with_tool(arm.chain), aside, far, size)
+                try:
+                    return _with_legs(cell, arm, pace)
+                except PadTooSmall:
+                    size += 1
         except InEachOthersWay as error:
             blocked = blocked or str(error)
         except RunError:
@@ -106,21 +122,45 @@ class InEachOthersWay(Exception):
     """An arm is in another's way even at its feeder."""
 
 
+class PadTooSmall(Exception):
+    """A pad does not bear what a larger one would."""
+
+
 def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     """The layout of a cell. Raises InEachOthersWay."""
     bare = _layout(cell, 1.0)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
-    tours = _alike({n: planner.tours() for n, planner in planners.items()})
-    for n, planner in planners.items():
-        for t in tours[n]:
-            solid = cell.product.solids[t.label]
-            load = Load(planner.name, t.label, solid, t.grip, cell.chain, t.brings)
-            load.check(pace, planner.damping, cell.pad)
+    tours = {
+        n: [_borne(cell, planner, tour, pace) for tour in planner.tours()]
+        for n, planner in planners.items()
+    }
+    tours = _alike(tours)
     private = _private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
     layout = _layout(cell, chains.length, chains)
-    apart = _exclusions(layout, [*_orders(cell, tours, private)], tours)
+    asked = [*_orders(cell, tours, private), *_left(cell, tours, homes(layout))]
+    apart = _exclusions(layout, asked, tours)
     return replace(layout, certificate=_certificate(cell, layout, apart))
+
+
+def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimits) -> ArmTour:
+    """A tour whose load the arm bears: its way is longer, so slower, where it must be. Raises
+    RunError (ArmLoad)."""
+    load = Load(
+        planner.name, tour.label, cell.burdens[tour.label], tour.grip, cell.chain, tour.brings
+    )
+    radius = cell.covered(tour.label)
+    longer = (tour.brings.stretch(share) for share in SLOWER)
+    for way in (tour.brings, *longer):
+        slow = replace(load, way=way)
+        if slow.is_borne(pace, planner.damping, radius):
+            return replace(tour, brings=way)
+    if slow.pull(pace, cell.burdens[tour.label].pad.radius) <= STRONG and cell.size + 1 < len(
+        cell.sizes
+    ):
+        raise PadTooSmall
+    load.check(pace, planner.damping, radius)
+    return tour
 
 
 def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
@@ -153,9 +193,9 @@ def _chains(
     for number, each in tours.items():
         damping = planners[number].damping
         for t in each:
-            solid, leaf = cell.product.solids[t.label], factory.by_label[t.label].index
-            join = factory.parents[leaf]
-            center = t.grip.local(solid.centre)
+            burden, leaf = cell.burdens[t.label], factory.by_label[t.label].index
+            join = burden.join.index
+            center = t.grip.local(burden.centre)
             rows[leaf, number], rows[join, number] = len(legs), len(legs) + 1
             legs.append(Leg(cell.chain, t.goes, REACH, False, np.zeros(3), damping))
             legs.append(Leg(cell.chain, t.brings, REACH, True, center, damping))
@@ -170,7 +210,7 @@ def _chains(
         arm,
         cell.stands,
         cell.wells,
-        {t.label: t.grip for each in tours.values() for t in each},
+        {label: t.grip for each in tours.values() for t in each for label in cell.names(t.label)},
         LegTable(legs),
         rows,
         standoffs,
@@ -181,24 +221,36 @@ def _chains(
 
 def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) -> Layout:
     """The layout with legs of a length [m]."""
-    factory, (x, y) = cell.factory, cell.station
+    factory, rails, (x, y) = cell.factory, cell.rails[0], cell.station
     arm = Guidepath((1.0, 0.0), (0.0, 1.0), (x, y), length, REACH, 0.0, 0.0, 0.0)
-    tools = cell.tools
-    paths = (cell.line, *(tools[n].path if n in tools else arm for n in cell.others))
-    stations = [cell.stop(o) if o.carrier == 0 and o.inputs else 0.0 for o in factory.operations]
-    visits = visits_of(factory, paths, stations)
-    for label, well in cell.wells.items():
+    paths, hands = dict.fromkeys(cell.arms, arm), dict[int, Hand | None]()
+    for carrier, line in cell.lines.items():
+        paths[carrier], hands[carrier] = line.path, line.hand_of(carrier)
+        for tool in line.tools:
+            paths[tool.robot], hands[tool.robot] = line.path_of(tool), line.hand_of(tool.robot)
+    stations = [
+        cell.lines[o.carrier].stop(o) if o.carrier in cell.lines and o.inputs else 0.0
+        for o in factory.operations
+    ]
+    robots = range(len(factory.robots))
+    visits = visits_of(factory, [paths[n] for n in robots], stations)
+    for label, burden in cell.burdens.items():
         key = factory.by_label[label].index, cell.arm_of[label]
         at = arm.middle(visits[key].at)
-        shift = well.place[0] - at[0], well.place[1] - at[1]
-        visits[key] = Visit(visits[key].at, 0.0, 0.0, well.elevation, shift)
+        if burden.source is None:
+            well = cell.wells[label]
+            place, elevation = well.place, well.elevation
+        else:
+            place, elevation = cell.lines[burden.source].station, 0.0
+        shift = place[0] - at[0], place[1] - at[1]
+        visits[key] = Visit(visits[key].at, 0.0, 0.0, elevation, shift)
     return replace(
-        cell.rails,
+        rails,
         factory=factory,
-        guidepaths=paths,
+        guidepaths=tuple(paths[n] for n in robots),
         visits=visits,
-        hands=(cell.rails.hands[0], *(tools[n].hand if n in tools else None for n in cell.others)),
-        floor=cell.floor,
+        hands=tuple(hands.get(n) for n in robots),
+        floor=floor_of(cell),
         certificate=None,
         plain=None,
         chains=chains,
@@ -264,26 +316,42 @@ def _orders(
     """What keeps arms apart at the station, and from the carrier that leaves it."""
     factory = cell.factory
     of = {t.label: (arm, t) for arm, each in tours.items() for t in each}
+    brought = {burden.join.index: label for label, burden in cell.burdens.items()}
     joins = sorted(
-        (factory.operations[factory.parents[factory.by_label[label].index]] for label in of),
-        key=lambda o: factory.postorder[o.index],
+        (burden.join for burden in cell.burdens.values()), key=lambda o: factory.postorder[o.index]
     )
 
     def gone(join: Operation, at: float) -> Past:
-        arm, _ = of[_brought(cell, join)]
+        arm, _ = of[brought[join.index]]
         return Past(join.end, carriage_axis(RobotId(arm)), round(REACH + at + BEYOND, 6))
 
     for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
-        (one, left), (other, _) = (of[_brought(cell, o)] for o in (before, after))
+        (one, left), (other, _) = (of[brought[o.index]] for o in (before, after))
         if one != other:
             past = gone(before, private[left.label].leaves)
             yield Away(past, after.index, int(after is joins[0]))
-    carried = [factory.operations[number] for number in factory.robots[0].operations]
-    for join, then in pairwise(carried):
-        if join in joins and then not in joins:
-            arm, tour = of[_brought(cell, join)]
-            off = _next(tours[arm], tour.label).goes.off
-            yield Away(gone(join, off), then.index, 0)
+    for carrier in cell.lines:
+        gear = [factory.operations[number] for number in factory.robots[carrier].operations]
+        for join, then in pairwise(gear):
+            if join.index in brought and then.index not in brought and then.carrier == carrier:
+                arm, tour = of[brought[join.index]]
+                off = _next(tours[arm], tour.label).goes.off
+                yield Away(gone(join, off), then.index, 0)
+
+
+def _left(
+    cell: Arrangement, tours: Mapping[int, Sequence[ArmTour]], alone: Collection[int]
+) -> Iterator[Away]:
+    """What keeps arms apart from carriers that they take sub-assemblies from: these stay until what
+    was taken is above them. Those that go home by themselves (`alone`) hold from below, or from
+    behind, and leave what an arm has as they leave a product at the outfeed."""
+    for arm, each in tours.items():
+        for tour in each:
+            burden = cell.burdens[tour.label]
+            if burden.source is not None and burden.source not in alone:
+                at = REACH + tour.brings.length - tour.brings.off - BEYOND
+                past = Past(burden.join.start, carriage_axis(RobotId(arm)), round(at, 6), -1)
+                yield Away(past, cell.factory.first(burden.source).index, 1)
 
 
 def _exclusions(
@@ -291,7 +359,9 @@ def _exclusions(
 ) -> Exclusions:
     """The passes and order places that are asked for; arms go by themselves to over their next
     feeders. Raises RunError (Layout) where the net with them is not live."""
-    backs = {arm: round(REACH + min(t.goes.hover for t in each), 6) for arm, each in tours.items()}
+    backs = homes(layout)
+    for arm, each in tours.items():
+        backs[arm] = round(REACH + min(t.goes.hover for t in each), 6)
     passes = tuple(dict.fromkeys(away.past for away in asked))
     net, operations = with_machines(layout, passes), layout.factory.operations
     event = {past: net.net.right[place] for past, (place, _) in net.passes.items()}
@@ -311,11 +381,6 @@ def _exclusions(
     return Exclusions(passes=passes, orders=orders, backs=tuple(backs.items()))
 
 
-def _brought(cell: Arrangement, join: Operation) -> str:
-    """The part that an arm brings to a join."""
-    return next(label for label in join.inputs if label in cell.arm_of)
-
-
 def _next(tours: Sequence[ArmTour], label: str) -> ArmTour:
     """The tour of an arm after that of a part."""
     labels = [t.label for t in tours]
@@ -324,7 +389,7 @@ def _next(tours: Sequence[ArmTour], label: str) -> ArmTour:
 
 def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certificate:
     """The certificate of a cell."""
-    rails = cell.rails.certificate
+    rails = cell.rails[0].certificate
     assert rails is not None
     return replace(
         rails,
@@ -339,9 +404,8 @@ def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certif
 def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     """The floor that machines take: the carrier's line, the arms up to their elbows, and their
     feeders."""
-    low, high = cell.carrier.low, cell.carrier.high
-    box = low[0], high[0], low[1], high[1]
-    yield Region(0, PAYLOADS, PAYLOAD_BODY, box, (0.0, high[2]))
+    for line in cell.lines.values():
+        yield from line.regions
     for arm, stand in cell.stands.items():
         (x, y, z), half = stand.place, 0.25 * cell.ring.outer
         box = x - half, x + half, y - half, y + half
@@ -349,7 +413,5 @@ def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     for label, well in cell.wells.items():
         arm = cell.arm_of[label]
         yield Region(arm, PAYLOADS, POST_BODY, well.feeder.housing, (0.0, cell.top), label)
-    for tool in cell.tools.values():
-        yield from tool.regions
     shed = layout.shed
     yield Region(0, PAYLOADS, POST_BODY, shed, (0.0, cell.top))

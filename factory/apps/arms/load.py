@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, RunError, Solid
+from factory.api import Array, Diagnostic, RunError
 from factory.apps.arms.arming import RAILS
+from factory.apps.arms.burdens import Burden
 from factory.apps.arms.cell import ToolGrip
 from factory.apps.arms.chain import SerialChain, cross
 from factory.apps.arms.dynamics import GRAVITY, torque_share
@@ -31,7 +32,7 @@ class Load:
     Attributes:
         robot: the arm's name.
         label: of the part.
-        solid: the part.
+        burden: what it brings.
         grip: how it is held.
         chain: the arm with its tool, without the part.
         way: followed by it.
@@ -39,7 +40,7 @@ class Load:
 
     robot: str
     label: str
-    solid: Solid
+    burden: Burden
     grip: ToolGrip
     chain: SerialChain
     way: JointWay
@@ -47,12 +48,17 @@ class Load:
     @property
     def center(self) -> Array:
         """The part's centre of mass in the tool's frame (3,) [m]."""
-        return self.grip.local(self.solid.centre)
+        return self.grip.local(self.burden.centre)
 
     @property
     def moment(self) -> Array:
         """Its inertia tensor about that centre, in the tool's frame (3, 3) [kg m²]."""
-        return np.asarray(self.grip.turn.T @ self.solid.inertia @ self.grip.turn)
+        return np.asarray(self.grip.turn.T @ self.burden.inertia @ self.grip.turn)
+
+    def is_borne(self, pace: WayLimits, damping: Array, radius: float) -> bool:
+        """Whether neither a drive nor the pad needs more than it has (see `check`)."""
+        needed = self.torques(pace, damping)
+        return bool((needed <= 1.0).all()) and self.pull(pace, radius) <= STRONG
 
     def check(self, pace: WayLimits, damping: Array, radius: float) -> None:
         """Check that neither a drive nor the pad needs more than it has, anywhere on the way, at
@@ -79,11 +85,11 @@ class Load:
         if used > STRONG:
             said = f"its pad, {1e3 * radius:.3g} mm in radius, bears {1 / used:.2g} times the load"
             helps = self.pull(slow, radius) <= STRONG
-            raise self._too_heavy(said, pace, self.solid.mass / used, slow if helps else None)
+            raise self._too_heavy(said, pace, self.burden.mass / used, slow if helps else None)
 
     def torques(self, pace: WayLimits, damping: Array, times: float = 1.0) -> Array:
         """Share (n,) of its limit that each drive needs, with so many times the part's mass."""
-        mass, moment = times * self.solid.mass, times * self.moment
+        mass, moment = times * self.burden.mass, times * self.moment
         loaded = self.chain.with_payload(mass, self.center, moment)
         return torque_share(loaded, self.way, pace, damping)
 
@@ -94,7 +100,7 @@ class Load:
             middle = (low + high) / 2
             fits = (self.torques(pace, damping, middle) <= 1.0).all()
             low, high = (middle, high) if fits else (low, middle)
-        return low * self.solid.mass
+        return low * self.burden.mass
 
     def pull(self, pace: WayLimits, radius: float) -> float:
         """Greatest share of the strength of a pad of a radius [m] that the part uses: by its
@@ -109,7 +115,7 @@ class Load:
         worst = 0.0
         for fast in (0.0 * most, most):
             for push in (-pace.acceleration, pace.acceleration):
-                force = self.solid.mass * (GRAVITY - push * first - fast * second)
+                force = self.burden.mass * (GRAVITY - push * first - fast * second)
                 force, twist = (
                     (tool @ v[..., None])[..., 0] for v in (force, -push * spin - fast * turned)
                 )
@@ -133,7 +139,7 @@ class Load:
         """What is said of a part that is too heavy at a pace: the greatest mass that is not, and
         a slower pace at which it is not, if it helps."""
         message = (
-            f"{self.robot} brings '{self.label}' of {self.solid.mass:.3g} kg: {said}, at"
+            f"{self.robot} brings '{self.label}' of {self.burden.mass:.3g} kg: {said}, at"
             f" {pace.speed:g} m/s and {pace.acceleration:g} m/s²"
         )
         mends = [f"a part of at most {most:.3g} kg", "another arm", RAILS]

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from math import pi
 
 import numpy as np
 
 from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
 from factory.apps.arms.arming import RAILS
-from factory.apps.arms.arrangement import CARRIER, Arrangement, Rise, feeder_name, placed_name
+from factory.apps.arms.arrangement import Arrangement, Rise
 from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, down
 from factory.apps.arms.certifying import uncertified
@@ -22,6 +22,7 @@ from factory.apps.arms.inverse import retreat, straight_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
 from factory.apps.arms.model import ArmModel
+from factory.apps.arms.obstacles import feeder_name, obstacles, placed_name
 from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
@@ -34,6 +35,9 @@ AT_END = 0.001
 
 CERTAIN, CERTAIN_AT_END = 0.004, 2e-4
 """Clearance that is certified on transfers, and on straight ends [m]."""
+
+SAME = 0.03
+"""Places that are nearer are one, as far as the tool's angle is concerned [m]."""
 
 VISITED = 0.002
 """Clearance that is asked of configurations in which parts are taken and placed [m]."""
@@ -87,7 +91,7 @@ class ArmPlanner:
         self.name, self.labels = cell.factory.robots[arm].name, cell.labels(arm)
         loads = {label: cell.loads(label) for label in self.labels}
         stand = cell.stands[arm]
-        self.scene = Scene(model, standing(model, stand), loads, [*cell.obstacles(arm, bare)])
+        self.scene = Scene(model, standing(model, stand), loads, [*obstacles(cell, arm, bare)])
         m = self.scene.m
         self._held = {
             label: [(m.geom_pos[g].copy(), m.geom_quat[g].copy()) for g in geoms]
@@ -107,12 +111,15 @@ class ArmPlanner:
             yaw, taken, placed = visits[number]
             before, (_, _, left) = self.labels[number - 1], visits[number - 1]
             out = self._line(left, cell.leaves(before), before)
-            over = self._line(taken, cell.over_well, label)
-            goes = self._leg(out, over, "", before, label)
+            enters = self._line(taken, cell.enters(label), label)
+            goes = self._leg(out, enters, "", before, label)
             self._hold(label, yaw)
+            exits = self._line(taken, cell.exits(label), label)
             into = self._line(placed, cell.rises(label), label)
-            brings = self._leg(over, into, label, label, label)
-            tours.append(ArmTour(label, ToolGrip(cell.tip[label], yaw), goes, brings))
+            brings = self._leg(exits, into, label, label, label)
+            tours.append(
+                ArmTour(label, ToolGrip(cell.tip[label], yaw, cell.covered(label)), goes, brings)
+            )
         return tours
 
     def _hold(self, label: str, yaw: float) -> None:
@@ -130,9 +137,9 @@ class ArmPlanner:
     def _visits(self) -> list[tuple[float, Array, Array]]:
         """For each part the angle of the tool, and the configurations in which it is taken and
         placed."""
-        angles = np.arange(YAWS) * 2 * pi / YAWS
         options, yaws = list[Array](), list[Array]()
-        for label in self.labels:
+        for number, label in enumerate(self.labels):
+            angles = (np.arange(YAWS) + self._turned(number) / 2) * 2 * pi / YAWS
             pairs, grips = self._options(label, angles)
             options.append(pairs)
             yaws.append(angles[grips])
@@ -141,14 +148,22 @@ class ArmPlanner:
             (float(yaws[k][n]), options[k][n, 0], options[k][n, 1]) for k, n in enumerate(chosen)
         ]
 
+    def _turned(self, number: int) -> bool:
+        """Whether a tour begins where the one before ends: the tool has another angle then, or the
+        arm would turn round on the spot, and nobody would know where on its way it is."""
+        cell, label, before = self.cell, self.labels[number], self.labels[number - 1]
+        if cell.burdens[label].source != cell.burdens[before].onto:
+            return False
+        off = cell.tip[label] - cell.tip[before]
+        return bool(np.linalg.norm(off[:2]) < SAME)
+
     def _options(self, label: str, angles: Array) -> tuple[Array, Index]:
         cell = self.cell
         turns = np.array([down(float(a) - cell.stands[self.arm].yaw) for a in angles])
         tip = cell.tip[label]
-        shown, placed = (
-            cell.local(self.arm, tip + off) for off in (cell.shown(label), cell.placed)
-        )
-        spared = {f"'{label}'", feeder_name(label), CARRIER, *self._later(label)}
+        ends = cell.shown(label), cell.placed(cell.burdens[label].onto)
+        shown, placed = (cell.local(self.arm, tip + off) for off in ends)
+        spared = {*self._spared_at(label), *self._spared_under(label)}
 
         def clearance(q: Array) -> tuple[Array, Index]:
             return self.scene.margins(q, "", VISITED, spared)
@@ -159,7 +174,7 @@ class ArmPlanner:
             (np.tile(placed, (len(angles), 1)), turns),
             clearance,
             np.zeros(len(self.chain)),
-            cell.over_well.length,
+            cell.enters(label).length,
         )
         if len(options.pairs):
             return options.pairs, options.grips
@@ -169,7 +184,7 @@ class ArmPlanner:
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
     ) -> Diagnostic:
         position = self.cell.factory.by_label[label].position
-        for up in (0.0, self.cell.over_well.length):
+        for up in (0.0, self.cell.enters(label).length):
             for place in places:
                 why = diagnose_reach(self.chain, place + np.array([0.0, 0.0, up]), turn)
                 if why is not None:
@@ -182,20 +197,34 @@ class ArmPlanner:
             message += f" and goes straight up by {up * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
-    def _later(self, label: str) -> set[str]:
-        """The parts in the product that are not there as one is placed, itself among them; all for
-        none."""
-        order = [self.cell.factory.first(0).label, *self._sequence]
-        later = order[order.index(label) :] if label else order
-        return {placed_name(one) for one in later}
+    def _spared_at(self, label: str, loaded: bool = False) -> set[str]:
+        """What does not count where the tool takes something: its feeder, or the carrier that it is
+        on with the part that it touches there, and with all of it where the tool is loaded."""
+        burden, cell = self.cell.burdens[label], self.cell
+        if burden.source is None:
+            return {f"'{label}'", feeder_name(label), *self._moving}
+        line = cell.lines[burden.source]
+        there = {placed_name(part, line) for part in burden.parts}
+        touched = there if loaded else {placed_name(burden.held, line)}
+        return {line.name, *self._moving} - (there - touched)
 
-    @property
-    def _sequence(self) -> list[str]:
-        """All parts that are placed, in that order."""
-        factory = self.cell.factory
-        return sorted(
-            self.cell.arm_of, key=lambda one: factory.postorder[factory.by_label[one].index]
-        )
+    def _spared_under(self, label: str) -> set[str]:
+        """What does not count where the tool places something, and where it leaves that: the
+        carrier, and all but what it is placed onto."""
+        burden = self.cell.burdens[label]
+        line = self.cell.lines[burden.onto]
+        there = {placed_name(part, line) for part in burden.there}
+        return {line.name, f"'{label}'", *self._moving} - there
+
+    @cached_property
+    def _moving(self) -> set[str]:
+        """What does not count on a transfer: what is on a carrier, which all is within what that
+        takes."""
+        return {
+            placed_name(part, line)
+            for line in self.cell.lines.values()
+            for part in line.rails.product.solids
+        }
 
     def _line(self, q: Array, rise: Rise, label: str) -> StraightEnd:
         """The straight line up from a visit."""
@@ -211,10 +240,9 @@ class ArmPlanner:
         self, out: StraightEnd, into: StraightEnd, label: str, before: str, after: str
     ) -> JointWay:
         """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
-        scene, every = self.scene, self._later("")
-        well = {f"'{after}'", feeder_name(after), *every}
-        pile = {CARRIER, f"'{label}'", *self._later(before)}
-        first, last = (well, pile) if label else (pile, well)
+        scene, every = self.scene, self._moving
+        taken, pile = self._spared_at(after, bool(label)), self._spared_under(before)
+        first, last = (taken, pile) if label else (pile, taken)
         way = leg(
             self.chain,
             out.rows,
@@ -265,9 +293,9 @@ class ArmPlanner:
         stem = [chain.tool_place - chain.tool_turn @ [0.0, 0.0, STEM], chain.tool_place]
         yield ConvexBody("tool", len(chain), np.array(stem), pad)
         if label:
-            solid = self.cell.product.solids[label]
-            middle = (solid.low + solid.high) / 2 - self.cell.tip[label]
+            burden = self.cell.burdens[label]
+            middle = (burden.low + burden.high) / 2 - self.cell.tip[label]
             aside, below = float(np.hypot(*middle[:2])), -float(middle[2])
-            half = float(np.linalg.norm(solid.high - solid.low)) / 2
+            half = float(np.linalg.norm(burden.high - burden.low)) / 2
             at = chain.tool_place + chain.tool_turn @ [0.0, 0.0, below]
             yield ConvexBody(label, len(chain), at[None], half + aside)

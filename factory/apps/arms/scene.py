@@ -65,7 +65,7 @@ class Scene:
                 ElementTree.SubElement(
                     tool,
                     "geom",
-                    name=f"load/{label}/{number}",
+                    name=f"load/{number}/{label}",
                     type="box",
                     pos=" ".join(map(str, place.tolist())),
                     size=" ".join(map(str, half.tolist())),
@@ -91,7 +91,7 @@ class Scene:
         self.loads: dict[str, list[int]] = {}
         for g, name in enumerate(self.names):
             if name.startswith("load/"):
-                self.loads.setdefault(name.split("/")[1], []).append(g)
+                self.loads.setdefault(name.split("/", 2)[2], []).append(g)
         held = {g for each in self.loads.values() for g in each}
         m.geom_sameframe[[*held]] = 0  # held turned, they have frames of their own
         self.links = [
@@ -133,7 +133,7 @@ class Scene:
         name = self.names[geom]
         if name.startswith("box/"):
             return self.obstacles[int(name[4:])]
-        return name.split("/")[1] if name.startswith("load/") else (name or "a link")
+        return name.split("/", 2)[2] if name.startswith("load/") else (name or "a link")
 
     def margins(
         self, q: Array, label: str, need: float, spared: Collection[str], held: bool = True

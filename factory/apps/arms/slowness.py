@@ -100,8 +100,8 @@ def way_through(
     for part, at in ((out, time[: len(out)]), (into, time[len(rows) - len(into) :])):
         inside = (t >= at[0]) & (t <= at[-1])
         path[inside] = JointWay(at - at[0], part).at(t[inside] - at[0])[0]
-    at = stiff[0] * (len(out) - 1), len(rows) - 1 - stiff[1] * (len(into) - 1)
-    first, last = np.interp(at, np.arange(len(rows)), time).tolist()
+    corners = stiff[0] * (len(out) - 1), len(rows) - 1 - stiff[1] * (len(into) - 1)
+    first, last = (float(v) for v in np.interp(corners, np.arange(len(rows)), time))
     for _ in range(2):
         half = np.clip(np.minimum(t - first, last - t) / 2, 0.0, rounding)
         path = box_average(t, path, half)

@@ -83,6 +83,8 @@ class Layout(Keeping, Pictured):
         and of the carrier from that (`factory.floor.layout.visits`)."""
         chosen = self.factory.operations[operation]
         robot, carrier = chosen.robots[slot], chosen.carrier
+        if self.chains is not None and carrier in self.chains.robots:
+            return 0.0, 0.0  # where that takes things is on its curve
         shifts = (self.visits[operation, number].shift for number in (robot, carrier))
         return stop_offset(self.guidepaths[robot], *shifts)
 

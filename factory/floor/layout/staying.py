@@ -236,8 +236,10 @@ class Staying:
 
 def goes_home(layout: Layout, robot: int, operation: int) -> bool:
     """Whether a robot that goes ahead before an operation goes home, not to where its visit is: it
-    takes a part there, or its hand is tall."""
-    hand = layout.hand(robot)
+    takes a part there, its hand is tall, or it moves several joints."""
+    hand, chains = layout.hand(robot), layout.chains
+    if chains is not None and robot in chains.robots:
+        return True
     return not layout.factory.operations[operation].inputs or (hand is not None and hand.tall)
 
 

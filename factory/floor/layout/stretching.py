@@ -81,7 +81,7 @@ class _Builder:
         back = max(0.0, -min(self.further(stop).values(), default=0.0))
         if self.piles:
             free = (self._free(guest, self.sides[guest]) for guest in guests)
-            self.station = up(max(self.own.least(stop, self.station) + back, *free))
+            self.station = up(max((self.own.least(stop, self.station) + back, *free)))
         else:
             self.station = up(back)
         for guest in guests:

@@ -125,7 +125,12 @@ def _levels(
         ends = [factory.operations[tour[-1]] for tour in tours]
         below = [0.0] * len(ends)
         if robot:
-            below = [elevations[o.carrier][factory.turns[o.index, o.carrier]] for o in ends]
+            below = [  # an arm, which takes what robots before it bring, has no level of its own
+                elevations[o.carrier][factory.turns[o.index, o.carrier]]
+                if o.carrier < robot
+                else 0.0
+                for o in ends
+            ]
         stroke, downs = factory.lowering(robot), [0.0] * len(ends)
         if factory.goes_up(robot) and len(ends) > 1 and shifts:
             over = [d - z for d, (_, _, z) in zip(below, shifts[robot], strict=True)]

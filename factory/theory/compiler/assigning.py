@@ -184,7 +184,8 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
                 raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
             if NOBODY not in does and len(does) < len(o.robots):
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
-            if any(turn[robot] < turn[o.carrier] for robot in o.robots):
+            lines = [robot for robot in o.robots if not base.robots[robot].body.first.moves]
+            if o.carrier in lines and any(turn[robot] < turn[o.carrier] for robot in lines):
                 raise _bad(f"in '{o.label}' a robot comes to one that is numbered after it")
     busy = {robot for turn in plan.turns for robot in turn} - {NOBODY}
     if len(busy) < len(every):

@@ -1,0 +1,88 @@
+"""What stands in the way of an arm of a cell, and the floor that the cell takes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from factory.api import Layout
+from factory.apps.arms.arrangement import Arrangement, pedestal
+from factory.apps.arms.lines import Line, upright
+from factory.apps.arms.scene import StandingBox
+from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.guidepath import Box
+from factory.support.arrays import Array
+
+BASE = 0.24
+"""Height of what of an arm stands above its pedestal, at least [m]."""
+
+
+def feeder_name(label: str) -> str:
+    """What the feeder of a part is called."""
+    return f"the feeder of '{label}'"
+
+
+def placed_name(label: str, line: Line) -> str:
+    """What a part on a line is called."""
+    return f"'{label}' on {line.name}" if line.carrier else f"'{label}' in the product"
+
+
+def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox]:
+    """What stands in an arm's way, or may come there while it is on a transfer.
+
+    Args:
+        cell: where things stand.
+        arm: the arm (index).
+        bare: the layout without legs.
+    """
+    yield StandingBox("the floor", (-9.0, -9.0, -0.1), (9.0, 9.0, 0.0))
+    for label, well in cell.wells.items():
+        xlo, xhi, ylo, yhi = well.feeder.housing
+        yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
+        yield from _part(cell, f"'{label}'", label, cell.shown(label))
+    for carrier, line in cell.lines.items():
+        yield from line.standing
+        for label in line.rails.product.solids:
+            yield from _part(cell, placed_name(label, line), label, cell.placed(carrier))
+        first = cell.factory.first(carrier).label
+        feeder = feeder_of(bare, first)
+        for name, box, bottom in (
+            ("post", feeder.post, 0.0),
+            ("boom", feeder.boom, feeder.low),
+            ("housing", feeder.housing, feeder.low),
+        ):
+            yield upright(f"the {name} of '{first}'", box, bottom, feeder.high)
+    yield upright("the outfeed's shed", bare.shed, 0.0, cell.top + 0.06)
+    yield upright("the outfeed", bare.outfeed, 0.0, cell.top)
+    for other, stand in cell.stands.items():
+        if other != arm:
+            name = cell.factory.robots[other].name
+            yield upright(f"the base of {name}", pedestal(stand), 0.0, stand.place[2] + BASE)
+
+
+def _part(cell: Arrangement, name: str, label: str, off: Array) -> Iterator[StandingBox]:
+    """The boxes round the convex pieces of a part."""
+    solid = cell.product.solids[label]
+    ends = [(piece.min(axis=0), piece.max(axis=0)) for piece in solid.pieces if solid.mesh]
+    for low, high in ends or [(solid.low, solid.high)]:
+        xlo, ylo, zlo = (low + off).tolist()
+        xhi, yhi, zhi = (high + off).tolist()
+        yield StandingBox(name, (xlo, ylo, zlo), (xhi, yhi, zhi))
+
+
+def floor_of(cell: Arrangement) -> Box:
+    """The floor that the cell takes [m]."""
+    rails, path = cell.rails[0], cell.rails[0].guidepaths[0]
+    xlo, xhi, ylo, yhi = rails.floor
+    boxes = [well.feeder.housing for well in cell.wells.values()]
+    boxes += map(pedestal, cell.stands.values())
+    for line in cell.lines.values():
+        boxes += [line.swept, *line.tool_boxes]
+    behind = xlo - path.middle(path.length)[0]
+    ends = [line.path.middle(line.path.length)[0] for line in cell.lines.values()]
+    c = cell.clearance
+    return (
+        float(min(behind + min(ends), *(b[0] for b in boxes))) - c,
+        float(max(xhi, *(b[1] for b in boxes))) + c,
+        float(min(ylo, *(b[2] for b in boxes))) - c,
+        float(max(yhi, *(b[3] for b in boxes))) + c,
+    )
