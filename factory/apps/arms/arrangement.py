@@ -31,8 +31,8 @@ APART = 0.02
 FULL = pi - 0.1
 """Angle from the station up to which there are feeders on either side of an arm [rad]."""
 
-TURN = 0.04
-"""Between the angles that are tried for a feeder or a line [rad]."""
+TURN, CIRCLES = 0.04, 4
+"""Between the angles that are tried for a feeder or a line [rad], and number of circles."""
 
 FAR_OFF = 9.0
 """Longer than any line [m]."""
@@ -246,7 +246,7 @@ class Arrangement:
         long as there is room: so the ways of both cross at the station alone."""
         stand, radius = self.stands[arm], self.near + CLOSER
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.clearance
-        angles, taken = [0.0, 0.0], [_behind(line) for n, line in self._lines.items() if n]
+        angles, taken = [0.0, 0.0], [*map(_behind, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
             solid = self.product.solids[label]
@@ -258,21 +258,32 @@ class Arrangement:
             preferred = number % 2
             if len(self.arms) > 1:
                 preferred = int(max(angles[0] + pitch, first) + pitch > FULL)
-            for side in (preferred, 1 - preferred):
-                angle = max(angles[side] + pitch, first)
-                while angle + pitch <= FULL:
-                    well = self._well(solid, stand, radius, angle if side else -angle)
-                    if not any(overlap(well.feeder.housing, box) for box in taken):
-                        break
-                    angle += TURN
-                if angle + pitch <= FULL:
-                    break
+            angle = max(angles[preferred] + pitch, first)
+            well = self._well(solid, stand, radius, angle if preferred else -angle)
+            if angle + pitch > FULL or self._meets(well, taken):
+                yield label, (well := self._anywhere(solid, stand, first, taken))
             else:
-                message = f"the feeder of '{label}' has no room round its arm"
-                hint = "more arms, smaller parts, or rails: leave out --arm"
-                raise RunError(Diagnostic("Layout", message, None, hint))
-            angles[side] = angle + pitch
-            yield label, well
+                angles[preferred] = angle + pitch
+                yield label, well
+            taken.append(_grown(well.feeder.housing))
+
+    def _anywhere(self, solid: Solid, stand: Stand, first: float, taken: Sequence[Box]) -> Well:
+        """The feeder of a part where one has room, on circles round an arm. Raises RunError
+        (Layout)."""
+        circles = np.linspace(self.near + CLOSER, self.ring.outer, CIRCLES)
+        for radius in circles.tolist():
+            for angle in np.arange(first, FULL, TURN).tolist():
+                for turned in (angle, -angle):
+                    well = self._well(solid, stand, radius, turned)
+                    if not self._meets(well, taken):
+                        return well
+        message = f"the feeder of '{solid.label}' has no room round its arm"
+        hint = "more arms, smaller parts, or rails: leave out --arm"
+        raise RunError(Diagnostic("Layout", message, None, hint))
+
+    @staticmethod
+    def _meets(well: Well, taken: Sequence[Box]) -> bool:
+        return any(overlap(well.feeder.housing, box) for box in taken)
 
     def _well(self, solid: Solid, stand: Stand, radius: float, angle: float) -> Well:
         """The feeder of a part on a circle round an arm, at an angle from the station [rad]."""
@@ -385,8 +396,14 @@ def pedestal(stand: Stand) -> Box:
     return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
 
 
+def _grown(box: Box) -> Box:
+    """A box with room round it [m]."""
+    return box[0] - APART, box[1] + APART, box[2] - APART, box[3] + APART
+
+
 def _behind(line: Line) -> Box:
-    """All that a line may take, wherever its tools and its feeder are, with room for what arms bring
-    [m]."""
+    """All that a line may take, wherever its tools and its feeder are; beside one that ends at an
+    arm there is room for what the arm brings [m]."""
     (x, y), (low, high) = line.station, line.band
-    return x - FAR_OFF, x + line.ahead + line.extent[1] + APART, y + low - APART, y + high + APART
+    room = APART if line.carrier else 0.0
+    return x - FAR_OFF, x + line.ahead + line.extent[1] + room, y + low - room, y + high + room

@@ -21,6 +21,7 @@ from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.tips import TipName
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""
@@ -55,11 +56,13 @@ class ToolGrip:
         tip: of the tool, in the product's frame (3,) [m].
         yaw: angle of the tool about the vertical [rad].
         radius: of what its pad covers there [m].
+        kind: of the tip: its pad holds by suction, or a pin in the pad's middle in a bore.
     """
 
     tip: Array
     yaw: float
     radius: float
+    kind: TipName = "suction"
 
     @property
     def turn(self) -> Array:
@@ -154,7 +157,7 @@ class CellChains:
     def hand(self, label: str) -> Hand:
         grip = self.grips[label]
         x, y, z = map(float, grip.tip)
-        return Hand("above", ((x, y, z),), grip.radius)
+        return Hand("above", ((x, y, z),), grip.radius, tip=grip.kind)
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

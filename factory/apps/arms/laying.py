@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
@@ -44,7 +45,8 @@ from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.leaving import homes
-from factory.floor.layout.hands.tips import STRONG
+from factory.floor.layout.hands.tips import TipName
+from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import Visit, visits_of
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
@@ -55,7 +57,7 @@ ASIDE = 0.0, 1.2, 1.8
 FAR = 0.41, 0.6, 0.8, 0.2
 """Shares that are tried as `Arrangement.far`."""
 
-SLOWER = 1.2, 1.44, 1.73, 2.07, 2.5, 3.0
+SLOWER = 1.0, 1.2, 1.44, 1.73, 2.07
 """How much longer ways are tried where a load is too much for a drive or a pad."""
 
 ELSEWHERE = "Unreachable", "NoWay", "Layout"
@@ -144,22 +146,19 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
 
 
 def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimits) -> ArmTour:
-    """A tour whose load the arm bears: its way is longer, so slower, where it must be. Raises
-    RunError (ArmLoad)."""
-    load = Load(
-        planner.name, tour.label, cell.burdens[tour.label], tour.grip, cell.chain, tour.brings
-    )
-    radius = cell.covered(tour.label)
-    longer = (tour.brings.stretch(share) for share in SLOWER)
-    for way in (tour.brings, *longer):
-        slow = replace(load, way=way)
-        if slow.is_borne(pace, planner.damping, radius):
-            return replace(tour, brings=way)
-    if slow.pull(pace, cell.burdens[tour.label].pad.radius) <= STRONG and cell.size + 1 < len(
-        cell.sizes
-    ):
-        raise PadTooSmall
-    load.check(pace, planner.damping, radius)
+    """A tour whose load the arm bears: its way is longer, so slower, where it must be; a pin holds
+    what is too much for the pad. Raises RunError (ArmLoad), PadTooSmall."""
+    burden, kinds = cell.burdens[tour.label], get_args(TipName)
+    for grip in (replace(tour.grip, kind=name) for name in kinds):
+        load = Load(planner.name, tour.label, burden, grip, cell.chain, tour.brings)
+        for share in SLOWER:
+            slow = replace(load, way=tour.brings.stretch(share))
+            if slow.is_borne(pace, planner.damping):
+                return replace(tour, grip=grip, brings=slow.way)
+        larger = replace(slow, grip=replace(grip, radius=float(burden.pad.radius)))
+        if grip.radius < larger.grip.radius and larger.is_borne(pace, planner.damping):
+            raise PadTooSmall
+    load.check(pace, planner.damping)
     return tour
 
 
@@ -250,6 +249,7 @@ def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) 
         guidepaths=tuple(paths[n] for n in robots),
         visits=visits,
         hands=tuple(hands.get(n) for n in robots),
+        payloads=payload_boxes(factory, cell.product),
         floor=floor_of(cell),
         certificate=None,
         plain=None,

@@ -55,19 +55,18 @@ class Load:
         """Its inertia tensor about that centre, in the tool's frame (3, 3) [kg m²]."""
         return np.asarray(self.grip.turn.T @ self.burden.inertia @ self.grip.turn)
 
-    def is_borne(self, pace: WayLimits, damping: Array, radius: float) -> bool:
-        """Whether neither a drive nor the pad needs more than it has (see `check`)."""
+    def is_borne(self, pace: WayLimits, damping: Array) -> bool:
+        """Whether neither a drive nor the tip of the tool needs more than it has (see `check`)."""
         needed = self.torques(pace, damping)
-        return bool((needed <= 1.0).all()) and self.pull(pace, radius) <= STRONG
+        return bool((needed <= 1.0).all()) and self.pull(pace) <= STRONG
 
-    def check(self, pace: WayLimits, damping: Array, radius: float) -> None:
-        """Check that neither a drive nor the pad needs more than it has, anywhere on the way, at
-        any speed and acceleration of a pace. Raises RunError (ArmLoad).
+    def check(self, pace: WayLimits, damping: Array) -> None:
+        """Check that neither a drive nor the tip of the tool needs more than it has, anywhere on
+        the way, at any speed and acceleration of a pace. Raises RunError (ArmLoad).
 
         Args:
             pace: limits of the way's coordinate.
             damping: of the joints (n,) [N m s/rad, N s/m].
-            radius: of the pad [m].
         """
         slow = WayLimits(pace.speed / 2, pace.acceleration / 4)
         needed = self.torques(pace, damping)
@@ -81,10 +80,12 @@ class Load:
             )
             helps = bool((self.torques(slow, damping) <= 1.0).all())
             raise self._too_heavy(said, pace, self._most(pace, damping), slow if helps else None)
-        used = self.pull(pace, radius)
+        used = self.pull(pace)
         if used > STRONG:
-            said = f"its pad, {1e3 * radius:.3g} mm in radius, bears {1 / used:.2g} times the load"
-            helps = self.pull(slow, radius) <= STRONG
+            what = {"suction": "pad", "pin": "pin"}[self.grip.kind]
+            size = f"{1e3 * self.grip.radius:.3g} mm in radius"
+            said = f"its {what}, {size}, bears {1 / used:.2g} times the load"
+            helps = self.pull(slow) <= STRONG
             raise self._too_heavy(said, pace, self.burden.mass / used, slow if helps else None)
 
     def torques(self, pace: WayLimits, damping: Array, times: float = 1.0) -> Array:
@@ -102,8 +103,8 @@ class Load:
             low, high = (middle, high) if fits else (low, middle)
         return low * self.burden.mass
 
-    def pull(self, pace: WayLimits, radius: float) -> float:
-        """Greatest share of the strength of a pad of a radius [m] that the part uses: by its
+    def pull(self, pace: WayLimits) -> float:
+        """Greatest share of the strength of the tool's tip that the part uses: by its
         weight, and by what it takes to accelerate and to turn it. It rests at both ends."""
         x = np.linspace(STEP, self.way.length - STEP, PLACES)
         (before, spun), (at, spin), (after, spins) = (self._moves(x + d) for d in (-STEP, 0, STEP))
@@ -112,7 +113,7 @@ class Load:
         tool = np.swapaxes(self.chain.tool(self.way.at(x)[0])[1], -1, -2)
         run = np.minimum(x, self.way.length - x)  # from rest, and to rest
         most = np.minimum(pace.speed**2, 2 * pace.acceleration * run)[:, None]
-        worst = 0.0
+        worst, radius = 0.0, np.array(self.grip.radius)
         for fast in (0.0 * most, most):
             for push in (-pace.acceleration, pace.acceleration):
                 force = self.burden.mass * (GRAVITY - push * first - fast * second)
@@ -120,7 +121,7 @@ class Load:
                     (tool @ v[..., None])[..., 0] for v in (force, -push * spin - fast * turned)
                 )
                 moment = twist + cross(np.broadcast_to(self.center, force.shape), force)
-                used = tip("suction").used(AHEAD, np.array(radius), np.zeros(3), force, moment)
+                used = tip(self.grip.kind).used(AHEAD, radius, np.zeros(3), force, moment)
                 worst = max(worst, float(used.max()))
         return worst
 

@@ -102,8 +102,8 @@ def takes_wholes(factory: Factory) -> bool:
 
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
     """The bodies of a factory's run; with `fuse`, or where a robot `takes_wholes`, every operation
-    with two inputs or more makes one of its own. Mass and inertia add up from the inputs, so this is linear in the labels, but for
-    the lists of parts."""
+    with two inputs or more makes one of its own. Mass and inertia add up from the inputs, so this
+    is linear in the labels, but for the lists of parts."""
     solids = product.solids
     centre = {label: solid.centre for label, solid in solids.items()}
     mass = {label: solid.mass for label, solid in solids.items()}

@@ -55,9 +55,10 @@ def pad_place(
     share: float = SHARE,
 ) -> PadPlace:
     """The place of a pad on a part that leaves with a heading, a horizontal direction along an
-    axis. The pad has the `largest` radius [m], but at most that `share` of the part's least extent in
-    plan, stays out of the rectangle that is `taken`, and is smaller if necessary. Among equal places the one nearest to the centre of mass is chosen; places
-    with material under the middle are preferred."""
+    axis. The pad has the `largest` radius [m], but at most that `share` of the part's least extent
+    in plan, stays out of the rectangle that is `taken`, and is smaller if necessary. Among equal
+    places the one nearest to the centre of mass is chosen; places with material under the middle
+    are preferred."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
     widest = max(min(largest, share * float((high - low).min())), NARROWEST)
     faces, drawn = Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))

@@ -32,7 +32,13 @@ class Bore:
 def bores(layout: Layout) -> Iterator[Bore]:
     """The bores for a layout's robots, in their order: half as wide as the collars of their
     hands."""
-    for robot, hand in zip(layout.factory.robots, layout.hands, strict=False):
+    factory, chains = layout.factory, layout.chains
+    for robot, hand in zip(factory.robots, layout.hands, strict=False):
+        if chains is not None and robot.index in chains.robots:
+            for label in factory.deliveries(robot.index):
+                if (tool := chains.hand(label)).tip == "pin":
+                    whole = label.partition("/")[0]
+                    yield Bore(whole, robot.name, tool.kind, tool.places[0], tool.radius)
         if hand is not None and hand.kind != "none" and hand.tip == "pin":
             label = held(layout.factory, robot.index)
             for at in hand.places:
