@@ -265,7 +265,7 @@ class Arrangement:
             else:
                 angles[preferred] = angle + pitch
                 yield label, well
-            taken.append(_grown(well.feeder.housing))
+            taken.append(well.feeder.housing)
 
     def _anywhere(self, solid: Solid, stand: Stand, first: float, taken: Sequence[Box]) -> Well:
         """The feeder of a part where one has room, on circles round an arm. Raises RunError
@@ -275,15 +275,17 @@ class Arrangement:
             for angle in np.arange(first, FULL, TURN).tolist():
                 for turned in (angle, -angle):
                     well = self._well(solid, stand, radius, turned)
-                    if not self._meets(well, taken):
+                    if not self._meets(well, taken, APART):
                         return well
         message = f"the feeder of '{solid.label}' has no room round its arm"
         hint = "more arms, smaller parts, or rails: leave out --arm"
         raise RunError(Diagnostic("Layout", message, None, hint))
 
     @staticmethod
-    def _meets(well: Well, taken: Sequence[Box]) -> bool:
-        return any(overlap(well.feeder.housing, box) for box in taken)
+    def _meets(well: Well, taken: Sequence[Box], room: float = 0.0) -> bool:
+        xlo, xhi, ylo, yhi = well.feeder.housing
+        grown = xlo - room, xhi + room, ylo - room, yhi + room
+        return any(overlap(grown, box) for box in taken)
 
     def _well(self, solid: Solid, stand: Stand, radius: float, angle: float) -> Well:
         """The feeder of a part on a circle round an arm, at an angle from the station [rad]."""
@@ -394,11 +396,6 @@ def pedestal(stand: Stand) -> Box:
     """The square round a pedestal [m]."""
     x, y, _ = stand.place
     return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
-
-
-def _grown(box: Box) -> Box:
-    """A box with room round it [m]."""
-    return box[0] - APART, box[1] + APART, box[2] - APART, box[3] + APART
 
 
 def _behind(line: Line) -> Box:

@@ -119,11 +119,6 @@ class CellChains:
         """The meshes of the arms by name."""
         return self.model.files
 
-    @property
-    def length(self) -> float:
-        """Length of each way [m]."""
-        return self.curves.legs[0].way.length
-
     @cached_property
     def sought(self) -> SoughtLegs:
         """The legs for one who does not know which an arm follows."""

@@ -150,11 +150,13 @@ class SoughtLegs:
 
     @cached_property
     def _grids(self) -> list[tuple[Array, Array]]:
-        """Configurations (legs, GRID, n) of each arm's legs, and where on these (GRID,) [m]."""
+        """Configurations (legs, GRID, n) of each arm's legs, and where on these (legs, GRID)
+        [m]."""
         grids = []
         for legs in self.legs:
-            s = np.linspace(0.0, legs[0].way.length, GRID)
-            grids.append((np.stack([leg.way.at(s)[0] for leg in legs]), s))
+            s = np.stack([np.linspace(0.0, leg.way.length, GRID) for leg in legs])
+            configurations = [leg.way.at(at)[0] for leg, at in zip(legs, s, strict=True)]
+            grids.append((np.stack(configurations), s))
         return grids
 
     def nearest(self, places: Array) -> tuple[Array, Array]:
@@ -178,5 +180,5 @@ class SoughtLegs:
         off = np.linalg.norm(grid - q, axis=-1)
         row, at = np.unravel_index(int(off.argmin()), off.shape)
         leg = self.legs[arm][int(row)]
-        (near,), (apart,) = leg.way.nearest(q[None], s[at : at + 1])
+        (near,), (apart,) = leg.way.nearest(q[None], s[row, at : at + 1])
         return leg, float(near), float(apart)

@@ -64,7 +64,7 @@ ELSEWHERE = "Unreachable", "NoWay", "Layout"
 """Errors that an arm may not have where it stands nearer to the station, or farther from it."""
 
 REACH = 0.2
-"""The coordinate of an arm's axis where it places [m]."""
+"""The least coordinate of an arm's axis at which it places [m]."""
 
 BEYOND = 0.001
 """How much further than it must an arm has gone where it counts as away [m]."""
@@ -130,16 +130,16 @@ class PadTooSmall(Exception):
 
 def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     """The layout of a cell. Raises InEachOthersWay."""
-    bare = _layout(cell, 1.0)
+    bare = _layout(cell, {})
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = {
         n: [_borne(cell, planner, tour, pace) for tour in planner.tours()]
         for n, planner in planners.items()
     }
-    tours = _alike(tours)
+    tours = _paired(tours)
     private = _private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
-    layout = _layout(cell, chains.length, chains)
+    layout = _layout(cell, tours, chains)
     asked = [*_orders(cell, tours, private), *_left(cell, tours, homes(layout))]
     apart = _exclusions(layout, asked, tours)
     return replace(layout, certificate=_certificate(cell, layout, apart))
@@ -162,18 +162,24 @@ def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimit
     return tour
 
 
-def _alike(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
-    """The tours of all arms with ways of one length."""
-    ways = [way for each in tours.values() for t in each for way in (t.goes, t.brings)]
-    length = max(way.length for way in ways)
+def _paired(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
+    """The tours of all arms, each way to a place as long as that from it; all ways begin or end at
+    the same coordinate at the feeders, where the longest begins at REACH."""
+    lengths = {
+        arm: [max(t.brings.length, _next(each, t.label).goes.length) for t in each]
+        for arm, each in tours.items()
+    }
+    far = REACH + max(map(max, lengths.values()))
     return {
         arm: [
             replace(
                 t,
-                goes=t.goes.stretch(length / t.goes.length),
-                brings=t.brings.stretch(length / t.brings.length),
+                goes=t.goes.stretch(lengths[arm][n - 1] / t.goes.length),
+                brings=t.brings.stretch(lengths[arm][n] / t.brings.length),
+                begins=far - lengths[arm][n - 1],
+                stop=far - lengths[arm][n],
             )
-            for t in each
+            for n, t in enumerate(each)
         ]
         for arm, each in tours.items()
     }
@@ -196,8 +202,8 @@ def _chains(
             join = burden.join.index
             center = t.grip.local(burden.centre)
             rows[leaf, number], rows[join, number] = len(legs), len(legs) + 1
-            legs.append(Leg(cell.chain, t.goes, REACH, False, np.zeros(3), damping))
-            legs.append(Leg(cell.chain, t.brings, REACH, True, center, damping))
+            legs.append(Leg(cell.chain, t.goes, t.begins, False, np.zeros(3), damping))
+            legs.append(Leg(cell.chain, t.brings, t.stop, True, center, damping))
             standoffs[join] = round(t.brings.length - t.brings.hover + BEYOND, 6)
             clear[leaf] = round(t.brings.off + BEYOND, 6)
             if private:
@@ -218,9 +224,13 @@ def _chains(
     )
 
 
-def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) -> Layout:
-    """The layout with legs of a length [m]."""
+def _layout(
+    cell: Arrangement, tours: Mapping[int, Sequence[ArmTour]], chains: CellChains | None = None
+) -> Layout:
+    """The layout with the legs of these tours, if there are any yet."""
     factory, rails, (x, y) = cell.factory, cell.rails[0], cell.station
+    every = [t for each in tours.values() for t in each]
+    length = max((t.brings.length for t in every), default=1.0)
     arm = Guidepath((1.0, 0.0), (0.0, 1.0), (x, y), length, REACH, 0.0, 0.0, 0.0)
     paths, hands = dict.fromkeys(cell.arms, arm), dict[int, Hand | None]()
     for carrier, line in cell.lines.items():
@@ -243,6 +253,9 @@ def _layout(cell: Arrangement, length: float, chains: CellChains | None = None) 
             place, elevation = cell.lines[burden.source].station, 0.0
         shift = place[0] - at[0], place[1] - at[1]
         visits[key] = Visit(visits[key].at, 0.0, 0.0, elevation, shift)
+    for t in every:
+        key = cell.burdens[t.label].join.index, cell.arm_of[t.label]
+        visits[key] = replace(visits[key], at=t.stop, shift=(t.stop - REACH, 0.0))
     return replace(
         rails,
         factory=factory,
@@ -322,8 +335,8 @@ def _orders(
     )
 
     def gone(join: Operation, at: float) -> Past:
-        arm, _ = of[brought[join.index]]
-        return Past(join.end, carriage_axis(RobotId(arm)), round(REACH + at + BEYOND, 6))
+        arm, tour = of[brought[join.index]]
+        return Past(join.end, carriage_axis(RobotId(arm)), round(tour.stop + at + BEYOND, 6))
 
     for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
         (one, left), (other, _) = (of[brought[o.index]] for o in (before, after))
@@ -349,7 +362,7 @@ def _left(
         for tour in each:
             burden = cell.burdens[tour.label]
             if burden.source is not None and burden.source not in alone:
-                at = REACH + tour.brings.length - tour.brings.off - BEYOND
+                at = tour.stop + tour.brings.length - tour.brings.off - BEYOND
                 past = Past(burden.join.start, carriage_axis(RobotId(arm)), round(at, 6), -1)
                 yield Away(past, cell.factory.first(burden.source).index, 1)
 
@@ -361,7 +374,7 @@ def _exclusions(
     feeders. Raises RunError (Layout) where the net with them is not live."""
     backs = homes(layout)
     for arm, each in tours.items():
-        backs[arm] = round(REACH + min(t.goes.hover for t in each), 6)
+        backs[arm] = round(min(t.begins + t.goes.hover for t in each), 6)
     passes = tuple(dict.fromkeys(away.past for away in asked))
     net, operations = with_machines(layout, passes), layout.factory.operations
     event = {past: net.net.right[place] for past, (place, _) in net.passes.items()}

@@ -52,12 +52,16 @@ class ArmTour:
         grip: how it is held.
         goes: the way on which the arm comes to take it.
         brings: the way on which the arm brings it.
+        begins: coordinate of the arm's axis where it begins to come [m].
+        stop: coordinate where it places it [m].
     """
 
     label: str
     grip: ToolGrip
     goes: JointWay
     brings: JointWay
+    begins: float = 0.0
+    stop: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
