@@ -72,22 +72,7 @@ def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
     if project.pag.mix is not None:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
-    orders = dict[str, tuple[str, ...]]()
-    made = _placing(project, model, orders)
-    stuck, tries = _not_lowered(made), TRIES
-    for node, part in [*stuck.values()]:
-        inputs = orders.get(node, _piles_first(project.pag, node))
-        at = inputs.index(part)
-        for place in range(at - 1, 0, -1):
-            rest = [label for label in inputs if label != part]
-            moved = {**orders, node: (*rest[:place], part, *rest[place:])}
-            tries -= 1
-            if tries < 0:
-                break
-            other = _placing(project, model, moved)
-            if len(left := _not_lowered(other)) < len(stuck):
-                made, stuck, orders = other, left, moved
-                break
+    made = _lowering(project, model)
     piles = [node for node in made.pag.nodes if node.operation == "pick"]
     if arms > 1 and piles:
         message = f"'{piles[0].inputs[0]}' is a sub-assembly: one arm makes what has such"
@@ -95,6 +80,39 @@ def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
         raise InputError(Diagnostic("NoCell", message, piles[0].position, hint))
     crew = tuple(_crew(made.compiled, model.kind, arms))
     return made.with_plan(Plan(turns=(crew,), lifts=frozenset()))
+
+
+def _lowering(project: Project, model: ArmModel) -> Project:
+    """The project with a place for each join, its inputs in an order in which as many as possible
+    can be lowered: sub-assemblies first, else as they are written, and what is stuck earlier."""
+    orders = dict[str, Sequence[str]]()
+    made, tries = _placing(project, model, orders), TRIES
+    stuck, better = _not_lowered(made), True
+    while stuck and better and tries:
+        better = False
+        for node, order in _others(project.pag, orders, stuck):
+            other = _placing(project, model, {**orders, node: order})
+            tries -= 1
+            if len(left := _not_lowered(other)) < len(stuck):
+                made, stuck, better = other, left, True
+                orders[node] = order
+                break
+            if not tries:
+                break
+    return made
+
+
+def _others(
+    pag: PAG, orders: Mapping[str, Sequence[str]], stuck: Mapping[str, tuple[str, str]]
+) -> Iterator[tuple[str, Sequence[str]]]:
+    """Other orders of the inputs of nodes, one of which is stuck in the one of `orders`."""
+    for node, part in stuck.values():
+        inputs = orders.get(node, _piles_first(pag, node))
+        if inputs != pag[node].inputs:
+            yield node, pag[node].inputs
+        rest = [label for label in inputs if label != part]
+        for place in range(inputs.index(part) - 1, 0, -1):
+            yield node, (*rest[:place], part, *rest[place:])
 
 
 def on_rails(project: Project, pag: PAG, pile: str) -> Project:

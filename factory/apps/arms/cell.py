@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import cos, hypot, sin
+from typing import Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -21,7 +22,6 @@ from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hands.hand import Hand
-from factory.floor.layout.hands.tips import TipName
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""
@@ -62,7 +62,7 @@ class ToolGrip:
     tip: Array
     yaw: float
     radius: float
-    kind: TipName = "suction"
+    kind: Literal["suction", "pin"] = "suction"
 
     @property
     def turn(self) -> Array:

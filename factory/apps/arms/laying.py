@@ -8,10 +8,8 @@ part, clear of all others (Theorem 20).
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import get_args
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,7 +19,6 @@ from factory.api import (
     Factory,
     Guidepath,
     Layout,
-    Operation,
     RunError,
 )
 from factory.apps.arms.arrangement import Arrangement
@@ -32,24 +29,28 @@ from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.load import Load
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.obstacles import floor_of
+from factory.apps.arms.orders import (
+    BEYOND,
+    InEachOthersWay,
+    PrivateParts,
+    exclusions_of,
+    next_tour,
+    orders_at_sources,
+    orders_of,
+    private_parts,
+)
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
-from factory.apps.arms.sharing import SweptArm, clear_share
 from factory.floor.layout.certificate import (
     ARM_BODY,
     POST_BODY,
     Exclusions,
-    Precedence,
     Region,
 )
-from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.leaving import homes
-from factory.floor.layout.hands.tips import TipName
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import Visit, visits_of
-from factory.theory.nets.coordinated import Past
-from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
 ASIDE = 0.0, 1.2, 1.8
 """Angles that are tried as `Arrangement.aside` [rad]."""
@@ -66,9 +67,6 @@ ELSEWHERE = "Unreachable", "NoWay", "Layout"
 REACH = 0.2
 """The least coordinate of an arm's axis at which it places [m]."""
 
-BEYOND = 0.001
-"""How much further than it must an arm has gone where it counts as away [m]."""
-
 
 def laid_out(
     factory: Factory, rails: Mapping[int, Layout], arm: ArmModel, pace: WayLimits
@@ -83,10 +81,10 @@ def laid_out(
 
     Raises RunError: Unreachable, NoWay, ArmLoad, Layout.
     """
-    refused: RunError | None = None
+    refused, cell = None, Arrangement(factory, rails, 0, with_tool(arm.chain), 0.0, 0.0)
     for far in FAR:
         try:
-            return _laid_out_at(factory, rails, arm, pace, far)
+            return _laid_out_at(cell.otherwise(far=far), arm, pace)
         except RunError as error:
             if not {*ELSEWHERE}.intersection(d.code for d in error.diagnostics):
                 raise
@@ -95,23 +93,17 @@ def laid_out(
     raise refused
 
 
-def _laid_out_at(
-    factory: Factory,
-    rails: Mapping[int, Layout],
-    arm: ArmModel,
-    pace: WayLimits,
-    far: float,
-) -> Layout:
+def _laid_out_at(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     """The layout with arms as far from the station as `Arrangement.far` says."""
-    blocked, size = "", 0
+    blocked = ""
     for aside in ASIDE:
         try:
             while True:
-                cell = Arrangement(factory, rails, with_tool(arm.chain), aside, far, size)
+                cell = cell.otherwise(aside=aside)
                 try:
                     return _with_legs(cell, arm, pace)
-                except PadTooSmall:
-                    size += 1
+                except PadTooSmall as error:
+                    cell = cell.otherwise(size=error.size)
         except InEachOthersWay as error:
             blocked = blocked or str(error)
         except RunError:
@@ -120,12 +112,12 @@ def _laid_out_at(
     raise RunError(Diagnostic("Layout", blocked, None, "one arm: --arm NAME"))
 
 
-class InEachOthersWay(Exception):
-    """An arm is in another's way even at its feeder."""
-
-
 class PadTooSmall(Exception):
-    """A pad does not bear what a larger one would."""
+    """A pad does not bear what a larger one does, that of another `size`."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.size = size
 
 
 def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
@@ -137,27 +129,30 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
         for n, planner in planners.items()
     }
     tours = _paired(tours)
-    private = _private_parts(planners, tours)
+    private = private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
     layout = _layout(cell, tours, chains)
-    asked = [*_orders(cell, tours, private), *_left(cell, tours, homes(layout))]
-    apart = _exclusions(layout, asked, tours)
+    alone = homes(layout)
+    asked = [*orders_of(cell, tours, private), *orders_at_sources(cell, tours, alone)]
+    apart = exclusions_of(layout, asked, tours)
     return replace(layout, certificate=_certificate(cell, layout, apart))
 
 
 def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimits) -> ArmTour:
     """A tour whose load the arm bears: its way is longer, so slower, where it must be; a pin holds
     what is too much for the pad. Raises RunError (ArmLoad), PadTooSmall."""
-    burden, kinds = cell.burdens[tour.label], get_args(TipName)
-    for grip in (replace(tour.grip, kind=name) for name in kinds):
+    burden = cell.burdens[tour.label]
+    for grip in (tour.grip, replace(tour.grip, kind="pin")):
         load = Load(planner.name, tour.label, burden, grip, cell.chain, tour.brings)
         for share in SLOWER:
             slow = replace(load, way=tour.brings.stretch(share))
             if slow.is_borne(pace, planner.damping):
                 return replace(tour, grip=grip, brings=slow.way)
-        larger = replace(slow, grip=replace(grip, radius=float(burden.pad.radius)))
-        if grip.radius < larger.grip.radius and larger.is_borne(pace, planner.damping):
-            raise PadTooSmall
+        for size in range(cell.size + 1, len(cell.sizes)):
+            radius = cell.otherwise(size=size).covered(tour.label)
+            larger = replace(slow, grip=replace(grip, radius=radius))
+            if radius > grip.radius and larger.is_borne(pace, planner.damping):
+                raise PadTooSmall(size)
     load.check(pace, planner.damping)
     return tour
 
@@ -166,7 +161,7 @@ def _paired(tours: Mapping[int, Sequence[ArmTour]]) -> dict[int, list[ArmTour]]:
     """The tours of all arms, each way to a place as long as that from it; all ways begin or end at
     the same coordinate at the feeders, where the longest begins at REACH."""
     lengths = {
-        arm: [max(t.brings.length, _next(each, t.label).goes.length) for t in each]
+        arm: [max(t.brings.length, next_tour(each, t.label).goes.length) for t in each]
         for arm, each in tours.items()
     }
     far = REACH + max(map(max, lengths.values()))
@@ -268,136 +263,6 @@ def _layout(
         plain=None,
         chains=chains,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class PrivateParts:
-    """On which parts of its ways an arm is clear of all ways of all other arms.
-
-    Attributes:
-        comes: as far on its way with a part [m].
-        leaves: from there on its way from where it has placed that part [m].
-    """
-
-    comes: float
-    leaves: float
-
-
-def _private_parts(
-    planners: Mapping[int, ArmPlanner], tours: Mapping[int, Sequence[ArmTour]]
-) -> dict[str, PrivateParts]:
-    """The private parts of the ways of each part; none in a cell of one arm. Raises
-    InEachOthersWay."""
-    if len(tours) == 1:
-        return {}
-    comes, leaves = dict[int, list[SweptArm]](), dict[int, list[SweptArm]]()
-    for arm, each in tours.items():
-        comes[arm] = [planners[arm].swept(t.brings, t.label) for t in each]
-        leaves[arm] = [planners[arm].swept(_next(each, t.label).goes) for t in each]
-    private = dict[str, PrivateParts]()
-    for arm, each in tours.items():
-        others = [way for one in tours if one != arm for way in (*comes[one], *leaves[one])]
-        for n, t in enumerate(each):
-            first = clear_share(comes[arm][n], others)
-            last = clear_share(leaves[arm][n].backwards, others)
-            if not first or not last:
-                name = planners[arm].name
-                raise InEachOthersWay(f"{name} is in another's way where it takes '{t.label}'")
-            length = t.brings.length
-            private[t.label] = PrivateParts(first * length, (1.0 - last) * length)
-    return private
-
-
-@dataclass(frozen=True, slots=True)
-class Away:
-    """An order: an operation starts when an arm has gone from where it placed a part.
-
-    Attributes:
-        past: the pass by which it has.
-        start: the operation (index) that waits.
-        tokens: how much more often it may have started.
-    """
-
-    past: Past
-    start: OperationId
-    tokens: int
-
-
-def _orders(
-    cell: Arrangement, tours: Mapping[int, Sequence[ArmTour]], private: Mapping[str, PrivateParts]
-) -> Iterator[Away]:
-    """What keeps arms apart at the station, and from the carrier that leaves it."""
-    factory = cell.factory
-    of = {t.label: (arm, t) for arm, each in tours.items() for t in each}
-    brought = {burden.join.index: label for label, burden in cell.burdens.items()}
-    joins = sorted(
-        (burden.join for burden in cell.burdens.values()), key=lambda o: factory.postorder[o.index]
-    )
-
-    def gone(join: Operation, at: float) -> Past:
-        arm, tour = of[brought[join.index]]
-        return Past(join.end, carriage_axis(RobotId(arm)), round(tour.stop + at + BEYOND, 6))
-
-    for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
-        (one, left), (other, _) = (of[brought[o.index]] for o in (before, after))
-        if one != other:
-            past = gone(before, private[left.label].leaves)
-            yield Away(past, after.index, int(after is joins[0]))
-    for carrier in cell.lines:
-        gear = [factory.operations[number] for number in factory.robots[carrier].operations]
-        for join, then in pairwise(gear):
-            if join.index in brought and then.index not in brought and then.carrier == carrier:
-                arm, tour = of[brought[join.index]]
-                off = _next(tours[arm], tour.label).goes.off
-                yield Away(gone(join, off), then.index, 0)
-
-
-def _left(
-    cell: Arrangement, tours: Mapping[int, Sequence[ArmTour]], alone: Collection[int]
-) -> Iterator[Away]:
-    """What keeps arms apart from carriers that they take sub-assemblies from: these stay until what
-    was taken is above them. Those that go home by themselves (`alone`) hold from below, or from
-    behind, and leave what an arm has as they leave a product at the outfeed."""
-    for arm, each in tours.items():
-        for tour in each:
-            burden = cell.burdens[tour.label]
-            if burden.source is not None and burden.source not in alone:
-                at = tour.stop + tour.brings.length - tour.brings.off - BEYOND
-                past = Past(burden.join.start, carriage_axis(RobotId(arm)), round(at, 6), -1)
-                yield Away(past, cell.factory.first(burden.source).index, 1)
-
-
-def _exclusions(
-    layout: Layout, asked: Sequence[Away], tours: Mapping[int, Sequence[ArmTour]]
-) -> Exclusions:
-    """The passes and order places that are asked for; arms go by themselves to over their next
-    feeders. Raises RunError (Layout) where the net with them is not live."""
-    backs = homes(layout)
-    for arm, each in tours.items():
-        backs[arm] = round(min(t.begins + t.goes.hover for t in each), 6)
-    passes = tuple(dict.fromkeys(away.past for away in asked))
-    net, operations = with_machines(layout, passes), layout.factory.operations
-    event = {past: net.net.right[place] for past, (place, _) in net.passes.items()}
-    called = [transition.name for transition in net.net.net.transitions]
-    orders = tuple(
-        Precedence(
-            f"order:{called[event[away.past]]}:{operations[away.start].label}",
-            called[event[away.past]],
-            called[operations[away.start].start],
-            away.tokens,
-        )
-        for away in asked
-    )
-    if with_machines(layout, passes, orders).deadlock:
-        message = "the arms wait for each other for ever"
-        raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
-    return Exclusions(passes=passes, orders=orders, backs=tuple(backs.items()))
-
-
-def _next(tours: Sequence[ArmTour], label: str) -> ArmTour:
-    """The tour of an arm after that of a part."""
-    labels = [t.label for t in tours]
-    return tours[(labels.index(label) + 1) % len(labels)]
 
 
 def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certificate:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import Layout
+from factory.api import Array, Layout
 from factory.apps.arms.arrangement import Arrangement, pedestal
-from factory.apps.arms.lines import Line, upright
+from factory.apps.arms.lines import Box, Line, upright
 from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box
-from factory.support.arrays import Array
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""

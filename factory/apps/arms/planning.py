@@ -12,12 +12,13 @@ import numpy as np
 
 from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
 from factory.apps.arms.arming import RAILS
-from factory.apps.arms.arrangement import Arrangement, Rise
+from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, down
 from factory.apps.arms.certifying import uncertified
 from factory.apps.arms.chain import ConvexBody
 from factory.apps.arms.circuit import candidates, circuit
+from factory.apps.arms.handling import Rise
 from factory.apps.arms.inverse import retreat, straight_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg

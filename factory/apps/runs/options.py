@@ -11,7 +11,7 @@ from factory.api import Diagnostic, InputError, usage_error
 from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
 
 if TYPE_CHECKING:
-    from factory.api import Factory, Marking, Product, Project, RunRequest
+    from factory.api import Factory, Layout, Marking, Product, Project, RunRequest
 
 APART = (
     (
@@ -145,12 +145,24 @@ class RunOptions:
             start,
             self.wip,
             self.distributed,
-            fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
+            self._fuses(layout),
             shown,
             recovers=self.recovers,
             catalogue=project.catalogue,
             demand=demand,
         )
+
+    def _fuses(self, layout: Layout) -> bool:
+        """Whether parts joined for good become one body. Raises InputError (Usage) where they have
+        to, and shall not."""
+        from factory.floor.geometry.fused_bodies import takes_wholes
+
+        if self.fuse is None:
+            return fusing_pays(layout.factory, layout.product)
+        if not self.fuse and takes_wholes(layout.factory):
+            why = "an arm takes sub-assemblies, and each of these is one body"
+            raise usage_error(why, "leave out --no-fuse")
+        return self.fuse
 
 
 def check_ideal(fuse: bool | None, monitor: bool = False) -> None:

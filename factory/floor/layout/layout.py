@@ -83,10 +83,9 @@ class Layout(Keeping, Pictured):
         and of the carrier from that (`factory.floor.layout.visits`)."""
         chosen = self.factory.operations[operation]
         robot, carrier = chosen.robots[slot], chosen.carrier
-        if self.chains is not None and carrier in self.chains.robots:
-            return 0.0, 0.0  # where that takes things is on its curve
-        shifts = (self.visits[operation, number].shift for number in (robot, carrier))
-        return stop_offset(self.guidepaths[robot], *shifts)
+        shifts = [self.visits[operation, number].shift for number in (robot, carrier)]
+        curved = self.chains is not None and carrier in self.chains.robots  # that is where it takes
+        return (0.0, 0.0) if curved else stop_offset(self.guidepaths[robot], *shifts)
 
     def mount(self, robot: int) -> Mount:
         """Where a robot's hand is mounted."""
@@ -247,10 +246,10 @@ class Layout(Keeping, Pictured):
         """
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
-        chains = self.chains
-        if chains and slot == operation.lowered and operation.robots[slot] in chains.robots:
-            return chains.standoff(operation.index)
-        path = self.guidepaths[operation.robots[slot]]
+        robot = operation.robots[slot]
+        if self.chains and slot == operation.lowered and robot in self.chains.robots:
+            return self.chains.standoff(operation.index)
+        path = self.guidepaths[robot]
         if slot == operation.lowered and not path.travels:
             return min(BESIDE, path.travel)
         if slot == operation.lowered:

@@ -28,8 +28,6 @@ ARMS = ("six", "six=2")
 SUBS = """root = x;
 x = mate ( y, z ); y = mate ( a, b ); z = mate ( c, d );
 a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
-TOOL = """root = x;
-x = weld ( y ); y = mate ( a, b ); a = atomic(); b = atomic()"""
 MIX = """mix = x, y;
 x = mate ( a, b ); y = mate ( c, d ); a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
 
@@ -136,18 +134,17 @@ def test_options_that_no_cell_has_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "said", "line"),
+    ("text", "arm", "code", "said", "line"),
     [
-        (SUBS, "NoCell", "joins the sub-assemblies 'y', 'z'", 2),
-        (TOOL, "NoCell", "'x' is made by a tool, weld", 2),
-        (MIX, "NoCell", "one product, not a mix", None),
-        (column(0.4), "Unreachable", "above its place", 4),
+        (SUBS, "six=2", "NoCell", "'z' is a sub-assembly: one arm", 2),
+        (MIX, "six", "NoCell", "one product, not a mix", None),
+        (column(0.4), "six", "Unreachable", "above its place", 4),
     ],
 )
 def test_what_a_cell_cannot_make_is_refused_where_it_is(
-    text: str, code: str, said: str, line: int | None
+    text: str, arm: str, code: str, said: str, line: int | None
 ) -> None:
-    why = refusal(text)
+    why = refusal(text, arm)
     assert why.code == code and said in why.message and "rails" in why.hint
     assert (why.position.line if why.position else None) == line
 
@@ -183,15 +180,15 @@ def test_three_arms_have_no_room() -> None:
     templates = all_templates()
     rails = Project(read_pag(text, templates), templates)
     factory = armed(rails, ArmModel.of("six"), 3).compiled
-    place = Arrangement(factory, rails.layout, ArmModel.of("six").chain)
+    place = Arrangement(factory, {0: rails.layout}, 0, ArmModel.of("six").chain, 0.0, 0.41)
     with pytest.raises(RunError) as error:
         place.stands  # noqa: B018
     assert_layout(error.value.diagnostics, "3 arms have no room", "at most 2")
 
 
 def test_feeders_without_room_are_refused() -> None:
-    """Of ten broad parts at one arm."""
-    count, wide = 10, 0.3
+    """Of sixteen broad parts at one arm."""
+    count, wide = 16, 0.3
     joins = "".join(f"s{n} = mate ( s{n - 1}, p{n} ); " for n in range(1, count + 1))
     parts = "; ".join(
         f"p{n} = atomic ( box = ({wide}, {wide}, 0.01), pos = (0, 0, {0.0152 + 0.0102 * n}) )"
@@ -208,19 +205,24 @@ def assert_layout(found: tuple[Diagnostic, ...], said: str, hint: str) -> None:
 
 
 def test_what_a_cell_says_of_its_arms() -> None:
-    """Each operation of an arm has a leg; ways are of one length."""
+    """Each operation of an arm has a leg; the way from a place is as long as the one to it, and all
+    meet where the arm takes parts."""
     layout = cell("six=2")
     table = chains(layout)
-    lengths = {round(leg.way.length, 9) for leg in table.curves.legs}
-    assert len(lengths) == 1
     for robot in layout.factory.robots[1:]:
-        rows = {table.row(operation, robot.index) for operation in robot.operations}
-        assert len(rows) == len(robot.operations)
+        rows = [table.row(operation, robot.index) for operation in robot.operations]
+        assert len({*rows}) == len(robot.operations)
+        legs = [table.curves.legs[row] for row in rows]
+        for goes, brings in zip(legs[::2], [legs[-1], *legs[1:-1:2]], strict=True):
+            assert goes.way.length == pytest.approx(brings.way.length)
+            assert goes.reach == pytest.approx(brings.reach)
+        taken = {round(leg.reach + leg.way.length, 9) for leg in legs}
+        assert taken == {round(layout.guidepaths[robot.index].length, 9)}
 
 
 def test_where_no_way_is_found_it_says_between_what() -> None:
     """In place of the search for ways one that finds none."""
-    with patch.object(planning, "leg", lambda *_: NoWay(0, 0.004, 9)):
+    with patch.object(planning, "leg", lambda *_, **__: NoWay(0, 0.004, 9)):
         why = refusal(SMALL)
     assert why.code == "NoWay" and "no way from 'lid' to 'motor'" in why.message
     assert "4.0 mm nearer" in why.message and "rails" in why.hint

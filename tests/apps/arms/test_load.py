@@ -29,9 +29,9 @@ def solid(mass: float = 1.0) -> Solid:
     return Project(read_pag(text, templates), templates).product.solids["b"]
 
 
-def load(seed: int, mass: float = 1.0) -> Load:
+def load(seed: int, mass: float = 1.0, radius: float = RADIUS) -> Load:
     part = solid(mass)
-    grip = ToolGrip(np.array([0.02, 0.005, part.high[2]]), 0.7)
+    grip = ToolGrip(np.array([0.02, 0.005, part.high[2]]), 0.7, radius)
     chain = shipped("six")
     return Load("r2", "b", part, grip, chain, random_way(chain, seed))
 
@@ -64,14 +64,14 @@ def test_the_pull_is_that_of_a_part_that_is_moved(seed: int) -> None:
                     t @ one.moment @ t.T @ turned(b, a, 2 * dt)
                     for b, t, a in zip(turns, turns[1:], turns[2:], strict=False)
                 ]
-                force = turns[2].T @ (one.solid.mass * ([0.0, 0.0, -9.81] - moved))
+                force = turns[2].T @ (one.burden.mass * ([0.0, 0.0, -9.81] - moved))
                 twist = -turns[2].T @ (momenta[2] - momenta[0]) / (2 * dt)
                 moment = twist + np.cross(one.center, force)
                 used = tip("suction").used(
                     np.array([0.0, 0.0, 1.0]), np.array(RADIUS), np.zeros(3), force, moment
                 )
                 worst = max(worst, float(used))
-    assert one.pull(PACE, RADIUS) == pytest.approx(worst, rel=0.02)
+    assert one.pull(PACE) == pytest.approx(worst, rel=0.02)
 
 
 def test_at_rest_a_pad_bears_the_weight_below_it() -> None:
@@ -82,8 +82,8 @@ def test_at_rest_a_pad_bears_the_weight_below_it() -> None:
     q[:, 0] += np.linspace(0.0, 0.5, 4)
     one = load(0)
     one = replace(one, chain=chain, way=JointWay(np.linspace(0.0, 1.0, 4), q))
-    centred = replace(one, grip=replace(one.grip, tip=one.solid.centre))
-    share = centred.pull(WayLimits(1e-6, 1e-6), RADIUS)
+    centred = replace(one, grip=replace(one.grip, tip=one.burden.centre))
+    share = centred.pull(WayLimits(1e-6, 1e-6))
     assert share == pytest.approx(9.81 / (5e4 * pi * RADIUS**2), rel=1e-3)
 
 
@@ -92,23 +92,34 @@ def test_the_mass_that_is_named_is_the_greatest() -> None:
     damping = np.zeros(6)
     for mass, radius in ((8.0, RADIUS), (60.0, 0.5)):
         with pytest.raises(RunError) as error:
-            load(1, mass).check(PACE, damping, radius)
+            load(1, mass, radius).check(PACE, damping)
         (why,) = error.value.diagnostics
         assert why.code == "ArmLoad" and f"'b' of {mass:g} kg" in why.message
         assert ("its pad" in why.message) == (radius == RADIUS)
         most = float(why.hint.split("at most ")[1].split()[0])
-        load(1, 0.98 * most).check(PACE, damping, radius)
+        load(1, 0.98 * most, radius).check(PACE, damping)
         with pytest.raises(RunError):
-            load(1, 1.02 * most).check(PACE, damping, radius)
+            load(1, 1.02 * most, radius).check(PACE, damping)
 
 
 def test_a_slower_pace_is_named_where_it_helps() -> None:
     heavy = load(2, 1.0)
-    used = heavy.pull(PACE, RADIUS)
+    used = heavy.pull(PACE)
     slow = WayLimits(PACE.speed / 2, PACE.acceleration / 4)
-    calm = heavy.pull(slow, RADIUS)
+    calm = heavy.pull(slow)
     assert calm < used
     for mass, helps in ((1.0 / (used * 0.9), True), (1.0 / (calm * 0.9), False)):
         with pytest.raises(RunError) as error:
-            load(2, mass).check(PACE, np.zeros(6), RADIUS)
+            load(2, mass).check(PACE, np.zeros(6))
         assert ("--acceleration" in error.value.diagnostics[0].hint) == helps
+
+
+def test_a_pin_bears_more_than_a_pad() -> None:
+    """As much more as it is pressed on, where nothing slips."""
+    one = load(1, 2.0)
+    pinned = replace(one, grip=replace(one.grip, kind="pin"))
+    assert not one.is_borne(PACE, np.zeros(6)) and pinned.is_borne(PACE, np.zeros(6))
+    assert pinned.pull(PACE) < one.pull(PACE) / 50
+    with pytest.raises(RunError) as error:
+        replace(pinned, grip=replace(pinned.grip, radius=1e-4)).check(PACE, np.zeros(6))
+    assert "its pin, 0.1 mm in radius" in error.value.diagnostics[0].message
