@@ -177,8 +177,10 @@ def instantiate(
     bodies = {inner.get("name"): inner for inner in body.iter("body")}
     towers = any(limb.name == "tower" for limb in held.limbs)
     _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
+    jaws = {jaw.name for jaw in model.made.jaws}
     turning = [limb for limb in held.limbs if not path.travels and limb.name in TOOL]
     others = [limb for limb in held.limbs if limb not in turning]
+    others = [limb for limb in others if limb.name.partition("/")[0] not in jaws]
     add_hand(body, bodies.get(head(robot)), held.styles, robot, others, model.name)
     add_hand(body, bodies.get(tool(robot)), held.styles, robot, turning, model.name)
     joints = {joint.get("name"): joint for joint in body.iter("joint")}
@@ -190,6 +192,8 @@ def instantiate(
     actuators: list[Element] = []
     for actuator in model.actuators:
         each = axes.get(actuator.get("joint") or "")
+        if actuator.get("joint") in jaws:
+            continue
         if each is None:
             _lock(body, f"{robot}/{actuator.get('joint')}")
             continue

@@ -23,9 +23,11 @@ from factory.theory.problem.robot_bodies import (
     MAST,
     MOTIONS,
     SLIDE,
+    Jaw,
     RobotAxis,
     RobotBody,
 )
+from factory.theory.problem.robot_jaws import JawReader
 from factory.theory.problem.robot_schema import (
     FITTED,
     HAND,
@@ -77,8 +79,9 @@ def read_body(name: str, path: Path) -> RobotBody:
 
 class _Reader:
     """Reads one file. What was met so far: `classes` of geoms, `materials`, the body of each of
-    the `geoms`, `joints`, `nests`; `masses`: of each body with a joint [kg]; `wide`: width of the
-    carriage, and `shown`: what is seen of it [m]."""
+    the `geoms`, `joints`, `nests`, `jaws`, each with the body around it; `masses`: of each body
+    with a joint [kg]; where the `nest` is, `wide`: width of the carriage, and `shown`: what is seen
+    of it [m]."""
 
     def __init__(self, document: RobotDocument) -> None:
         self.document = document
@@ -87,7 +90,8 @@ class _Reader:
         self.geoms, self.bodies = dict[str, str](), set[str]()
         self.masses = dict.fromkeys(MOVING, 0.0)
         self.joints = dict[str, Element]()
-        self.nests = list[tuple[str, str]]()
+        self.nests, self.jaws = list[tuple[str, str]](), list[tuple[Element, str]]()
+        self.nest = [0.0, 0.0, 0.0]
         self.wide = 0.0
         self.shown = list[tuple[Element, str, list[float], list[float]]]()
 
@@ -109,13 +113,32 @@ class _Reader:
             self.document.stop()
         self._inside(bodies[0], "carriage", "")
         self._fittings(root)
-        axes = self._axes(bodies[0], sections["actuator"])
+        jaws = self._jaws(sections["actuator"])
+        closing = {jaw.attributes.get("name") for jaw, _ in self.jaws}
+        drives = [d for d in sections["actuator"] if d.attributes.get("joint") not in closing]
+        axes = self._axes(bodies[0], drives)
         self.document.stop()
         wide = max(CARRIAGE, 0.002 * ceil(self.wide * 500 - 1e-6))
         for shown in self.shown:
             self._stands_out(*shown, wide / 2)
         self.document.stop()
-        return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes)
+        return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes, jaws)
+
+    def _jaws(self, drives: list[Element]) -> tuple[Jaw, ...]:
+        """The jaws, whose masses are those of what they are in."""
+        holder = self.nests[0][0] if self.nests else ""
+        jaws = JawReader(self.document, self._merged, self.nest, drives).jaws(self.jaws, holder)
+        if jaws:
+            self.masses[holder] += sum(jaw.mass for jaw in jaws)
+        return jaws
+
+    def _merged(self, geom: Element) -> Values:
+        """The attributes of a geom, with those of its class."""
+        return {
+            **UNSET,
+            **self.classes.get(geom.attributes.get("class", ""), {}),
+            **geom.attributes,
+        }
 
     def _wrong(self, element: Element, what: str, valid: str) -> None:
         self.document.wrong(element, what, valid)
@@ -141,12 +164,17 @@ class _Reader:
             self._joint(joint, name)
         for geom in body.all("geom"):
             self._geom(geom, name if name in MOVING else "", inherited)
-        self.nests += [(name, site.attributes.get("name", "")) for site in body.all("site")]
+        for site in body.all("site"):
+            self.nests.append((name, site.attributes.get("name", "")))
+            self.nest = numbers(site.attributes.get("pos", "0 0 0"))
         below = MOVING[MOVING.index(name) + 1 :][:1] if name in MOVING else ()
         for child in body.all("body"):
             called = self.document.name(child, self.bodies)
             self.bodies.add(called)
-            if called in MOVING and called not in below:
+            joint = child.first("joint")
+            if joint is not None and joint.attributes.get("name") not in JOINTS:
+                self.jaws.append((child, name))
+            elif called in MOVING and called not in below:
                 what = f"the body '{called}' is inside '{name}'"
                 self._wrong(child, what, "'head' inside 'carriage', 'tool' inside 'head'")
             else:
@@ -155,6 +183,10 @@ class _Reader:
     def _joint(self, joint: Element, body: str) -> None:
         name = self.document.name(joint, self.joints)
         self.joints[name] = joint
+        if "range" in joint.attributes:
+            self._wrong(
+                joint, "<joint> has 'range', which is not read", "none: layouts set its ends"
+            )
         where, kind, axis = JOINTS.get(name, ("", "", ()))
         if where != body:
             valid = ", ".join(f"'{j}' in '{b}'" for j, (b, *_) in JOINTS.items())

@@ -57,7 +57,7 @@ class HandsApart:
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         hand = self.hand_of(carrier, t)
         if hand.kind == "below" and kind == "below":
-            half = max(FINGER / 2, hand.radius) + BESIDE
+            half = hand.half + BESIDE
             free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
                 places.radius
             ) + half

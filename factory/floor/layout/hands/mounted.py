@@ -8,6 +8,7 @@ from typing import Literal
 
 from factory.floor.layout.dimensions import FINGER, FINGER_LOW, FINGER_TOP
 from factory.floor.layout.guidepath import Extent, Point2
+from factory.floor.layout.hands.clamp import PALM
 from factory.floor.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
@@ -104,6 +105,9 @@ def _below(mount: Mount, hand: Hand) -> Iterator[Limb]:
         yield from _rod(f"{which}column", x, y, half, FINGER_TOP, top - PAD, lifted)
         low = max(top - PAD, FINGER_TOP)
         yield from _rod(f"{which}pad", x, y, hand.radius, low, top, lifted)
+    for name, (least, most) in hand.clamp.boxes(reached[0]) if hand.clamp else ():
+        (a, b, c), (d, e, f) = ((round(v, 6) for v in end) for end in (least, most))
+        yield Limb(name if name == PALM else f"{name}/pad", (a, b, c), (d, e, f), "", lifted)
 
 
 def _behind(mount: Mount, hand: Hand) -> Iterator[Limb]:
