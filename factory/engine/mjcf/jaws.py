@@ -62,10 +62,10 @@ def add_jaws(world: Element, actuator: Element, layout: Layout, settings: Settin
 
 
 def jaw_drive(jaw: Jaw, settings: Settings) -> Drive:
-    """The drive of a jaw, no stronger than its motor."""
+    """The drive of a jaw, as strong as its motor."""
     moved = jaw.mass + jaw.armature
     drive = drive_for(moved, 0.0, JAW_PROFILE.acceleration, settings, HOIST_STIFFNESS)
-    return replace(drive, force=min(drive.force, jaw.force))
+    return replace(drive, force=jaw.force)
 
 
 def _box(layout: Layout, robot: Robot, clamp: Clamp, jaw: Jaw) -> dict[str, str]:
