@@ -85,8 +85,8 @@ def jaw(robot: str, name: str) -> str:
 
 
 def jaw_face(robot: str, name: str) -> str:
-    """The geom of a robot's jaw, which closes on what it holds: `r3/left/pad`."""
-    return f"{robot}/{name}/pad"
+    """The geom of a robot's jaw: `r3/left/jaw`."""
+    return f"{robot}/{name}/jaw"
 
 
 def copy(label: str, number: int) -> str:

@@ -258,7 +258,8 @@ def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: Rob
             parents[geom].remove(geom)
     for lifted in body.iter("body"):
         if (lifted.get("name") or "").endswith("/head"):
-            mass = number(made.axis(LIFT_JOINT).mass)
+            beside = sum(jaw.mass for jaw in made.jaws)
+            mass = number(round(made.axis(LIFT_JOINT).mass - beside, 9))
             inertia = {"pos": "0 0 0.1", "mass": mass, "diaginertia": "2e-4 2e-4 2e-4"}
             lifted.insert(1, Element("inertial", inertia))
     for site in body.iter("site"):

@@ -35,8 +35,11 @@ class Jaws:
         self._rows: dict[tuple[int, int], Index] = {}
         self._closed, self._closing = dict[int, Index](), set[int]()
         self._moves: Stroking | None = None
+        self._faces: dict[int, list[int]] = {}
         called, closed = list[str](), list[float]()
         for robot, clamp in clamps_of(model.layout):
+            faces = (names.jaw_face(robot.name, jaw.name) for jaw in clamp.jaws)
+            self._faces[robot.index] = [m.geom(face).id for face in faces]
             for tour, each in enumerate(clamp.closed):
                 self._rows[robot.index, tour] = len(called) + np.arange(len(each))
                 called += [names.jaw(robot.name, jaw.name) for jaw in clamp.jaws]
@@ -78,9 +81,15 @@ class Jaws:
                 self._closed[robot] = rows
                 self._closing.add(robot)
 
-    def tend(self, operations: Iterable[Operation], held: Callable[[int], Collection[str]]) -> None:
-        """Operations have ended: what was taken in them is held. Open jaws that hold nothing."""
-        self._closing.difference_update(r for o in operations for r in o.robots)
+    def taken(self, operations: Iterable[Operation]) -> dict[int, list[int]]:
+        """Operations have ended: what jaws have closed on in them is held. The geoms of these, by
+        robot (index)."""
+        robots = [r for o in operations for r in o.robots if r in self._closing]
+        self._closing.difference_update(robots)
+        return {robot: self._faces[robot] for robot in robots}
+
+    def tend(self, held: Callable[[int], Collection[str]]) -> None:
+        """Open jaws that hold nothing."""
         if self._moves is None:
             return
         self._moves.settle()

@@ -107,10 +107,10 @@ class Clamping:
         least, most, widest = low, high, np.full(len(at), -np.inf)
         steps = np.linspace(0.0, 1.0, GRID)
         for _ in range(1 + FINER):
-            lines = np.zeros((len(at), GRID, GRID, 3))
-            lines[..., along] = (low[:, :1] + (high - low)[:, :1] * steps)[:, :, None]
-            lines[..., 2] = (low[:, 1:] + (high - low)[:, 1:] * steps)[:, None, :]
-            lines = lines.reshape(len(at), -1, 3)
+            grid = np.zeros((len(at), GRID, GRID, 3))
+            grid[..., along] = (low[:, :1] + (high - low)[:, :1] * steps)[:, :, None]
+            grid[..., 2] = (low[:, 1:] + (high - low)[:, 1:] * steps)[:, None, :]
+            lines = grid.reshape(len(at), -1, 3)
             out = self.holding.surfaces.outermost(parts, lines.reshape(-1, 3), side)
             out = out.reshape(lines.shape[:2])
             best = np.arange(len(at)), out.argmax(axis=1)

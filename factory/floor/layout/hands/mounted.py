@@ -107,7 +107,7 @@ def _below(mount: Mount, hand: Hand) -> Iterator[Limb]:
         yield from _rod(f"{which}pad", x, y, hand.radius, low, top, lifted)
     for name, (least, most) in hand.clamp.boxes(reached[0]) if hand.clamp else ():
         (a, b, c), (d, e, f) = ((round(v, 6) for v in end) for end in (least, most))
-        yield Limb(name if name == PALM else f"{name}/pad", (a, b, c), (d, e, f), "", lifted)
+        yield Limb(name if name == PALM else f"{name}/jaw", (a, b, c), (d, e, f), "", lifted)
 
 
 def _behind(mount: Mount, hand: Hand) -> Iterator[Limb]:
