@@ -6,11 +6,11 @@ actuator, all of its name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from factory.support.xml_tree import Element
-from factory.theory.problem.robot_bodies import Jaw
-from factory.theory.problem.robot_schema import RobotDocument, numbers
+from factory.theory.problem.robot_bodies import MOTIONS, TURN_JOINT, Jaw
+from factory.theory.problem.robot_schema import JOINTS, RobotDocument, numbers
 
 LONGEST = 0.05
 """Greatest stroke of a jaw [m]."""
@@ -21,11 +21,14 @@ TALLEST = 0.03
 WIDEST = 0.03
 """Greatest width of a jaw along the heading [m]."""
 
+TURNS = MOTIONS[TURN_JOINT].body
+"""The body that turns what it holds: its jaws would sweep a circle."""
+
 SOLID = ("1", "1", "0")
 """contype, conaffinity and group of what collides."""
 
-Merge = Callable[[Element], Mapping[str, str]]
-"""Gives the attributes of a geom, with those of its class."""
+Merge = Callable[[Element, str], Mapping[str, str]]
+"""Gives the attributes of a geom, with those of its class, or of the one that its body has."""
 
 
 class JawReader:
@@ -33,37 +36,46 @@ class JawReader:
 
     Args:
         document: the document, in which faults are noted.
-        merge: gives the attributes of a geom, with those of its class.
-        nest: where the nest is [m].
-        drives: the actuators.
+        merge: gives the attributes of a geom, as `Merge`.
     """
 
-    def __init__(
-        self,
-        document: RobotDocument,
-        merge: Merge,
-        nest: Sequence[float],
-        drives: Sequence[Element],
-    ) -> None:
-        self.document, self._merge, self._nest = document, merge, nest
-        self._drives = {drive.attributes.get("joint"): drive for drive in drives}
+    def __init__(self, document: RobotDocument, merge: Merge) -> None:
+        self.document, self._merge = document, merge
+        self._bodies = list[tuple[Element, str, str]]()
+        self._nest: Sequence[float] = ()
+        self._drives: dict[str | None, Element] = {}
 
-    def jaws(self, bodies: Sequence[tuple[Element, str]], holder: str) -> tuple[Jaw, ...]:
-        """The jaws that some bodies are, each with the body that it is in; `holder`: the body with
-        the nest."""
-        jaws = list[Jaw]()
-        for body, inside in bodies:
-            if inside != holder:
+    def take(self, body: Element, inside: str, of: str) -> bool:
+        """Whether a body is a jaw, which is kept with the body that it is in, and the class of that
+        one's geoms: its joint is none of those that move robots."""
+        joint = body.first("joint")
+        if joint is None or joint.attributes.get("name") in JOINTS:
+            return False
+        self._bodies.append((body, inside, body.attributes.get("childclass", of)))
+        return True
+
+    def others(self, drives: Iterable[Element]) -> list[Element]:
+        """Those of some actuators that are not of jaws."""
+        names = {body.attributes.get("name") for body, *_ in self._bodies}
+        return [drive for drive in drives if drive.attributes.get("joint") not in names]
+
+    def read(self, holder: str, nest: Sequence[float], root: Element) -> tuple[Jaw, ...]:
+        """The jaws of a document; `holder`: the body with the nest, which is there [m]."""
+        drives = (drive for section in root.all("actuator") for drive in section.children)
+        self._drives = {drive.attributes.get("joint"): drive for drive in drives}
+        self._nest, jaws, bodies = nest, list[Jaw](), self._bodies
+        for body, inside, of in bodies:
+            if inside != holder or holder == TURNS:
                 what = f"the jaw '{body.attributes['name']}' is in '{inside}'"
-                self.document.wrong(body, what, f"in '{holder}', which has the nest")
-            elif jaw := self._jaw(body):
+                self.document.wrong(body, what, "in the carriage or the head, where the nest is")
+            elif jaw := self._jaw(body, of):
                 jaws.append(jaw)
         if bodies and len(jaws) == len(bodies) and sorted(jaw.side for jaw in jaws) != [-1, 1]:
             what = f"it has {len(jaws)} jaws, of which {sum(j.side > 0 for j in jaws)} on the left"
             self.document.wrong(bodies[0][0], what, "two, one on each side of the nest")
         return tuple(jaws)
 
-    def _jaw(self, body: Element) -> Jaw | None:
+    def _jaw(self, body: Element, of: str) -> Jaw | None:
         name = body.attributes["name"]
         parts = {kind: list(body.all(kind)) for kind in ("joint", "geom")}
         named = [each.attributes.get("name") for kind in parts for each in parts[kind]]
@@ -74,7 +86,8 @@ class JawReader:
             self.document.wrong(body, what, valid)
             return None
         (joint,), (geom,) = parts["joint"], parts["geom"]
-        box = self._box(geom, name)
+        values = self._merge(geom, of)
+        box = self._box(geom, values, name)
         if box is None or not self._slides(joint, name):
             return None
         low, high = box
@@ -88,7 +101,6 @@ class JawReader:
             self.document.wrong(joint, what, "towards the nest, and less far than there")
             return None
         force = self._force(drive, name)
-        values = self._merge(geom)
         mass = numbers(values.get("mass", "0"))[0]
         if mass <= 0:
             self.document.wrong(geom, f"the jaw '{name}' has the mass {mass:g} kg", "above 0")
@@ -110,10 +122,9 @@ class JawReader:
         return False
 
     def _box(
-        self, geom: Element, name: str
+        self, geom: Element, values: Mapping[str, str], name: str
     ) -> tuple[tuple[float, float, float], tuple[float, float, float]] | None:
         """The corners of a jaw's box from the nest, open [m]."""
-        values = self._merge(geom)
         masks = tuple(values[key] for key in ("contype", "conaffinity", "group"))
         half = numbers(values.get("size", ""))
         if values["type"] != "box" or len(half) != 3 or min(half) <= 0 or masks != SOLID:

@@ -23,7 +23,6 @@ from factory.theory.problem.robot_bodies import (
     MAST,
     MOTIONS,
     SLIDE,
-    Jaw,
     RobotAxis,
     RobotBody,
 )
@@ -79,9 +78,8 @@ def read_body(name: str, path: Path) -> RobotBody:
 
 class _Reader:
     """Reads one file. What was met so far: `classes` of geoms, `materials`, the body of each of
-    the `geoms`, `joints`, `nests`, `jaws`, each with the body around it; `masses`: of each body
-    with a joint [kg]; where the `nest` is, `wide`: width of the carriage, and `shown`: what is seen
-    of it [m]."""
+    the `geoms`, `joints`, `nests`, `jaws`; `masses`: of each body with a joint [kg]; where the
+    `nest` is, `wide`: width of the carriage, and `shown`: what is seen of it [m]."""
 
     def __init__(self, document: RobotDocument) -> None:
         self.document = document
@@ -90,8 +88,8 @@ class _Reader:
         self.geoms, self.bodies = dict[str, str](), set[str]()
         self.masses = dict.fromkeys(MOVING, 0.0)
         self.joints = dict[str, Element]()
-        self.nests, self.jaws = list[tuple[str, str]](), list[tuple[Element, str]]()
-        self.nest = [0.0, 0.0, 0.0]
+        self.nests, self.nest = list[tuple[str, str]](), [0.0, 0.0, 0.0]
+        self.jaws = JawReader(document, self._merged)
         self.wide = 0.0
         self.shown = list[tuple[Element, str, list[float], list[float]]]()
 
@@ -113,10 +111,10 @@ class _Reader:
             self.document.stop()
         self._inside(bodies[0], "carriage", "")
         self._fittings(root)
-        jaws = self._jaws(sections["actuator"])
-        closing = {jaw.attributes.get("name") for jaw, _ in self.jaws}
-        drives = [d for d in sections["actuator"] if d.attributes.get("joint") not in closing]
-        axes = self._axes(bodies[0], drives)
+        jaws = self.jaws.read(self.nests[0][0] if self.nests else "", self.nest, root)
+        for jaw in jaws:
+            self.masses[self.nests[0][0]] += jaw.mass
+        axes = self._axes(bodies[0], self.jaws.others(sections["actuator"]))
         self.document.stop()
         wide = max(CARRIAGE, 0.002 * ceil(self.wide * 500 - 1e-6))
         for shown in self.shown:
@@ -124,21 +122,10 @@ class _Reader:
         self.document.stop()
         return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes, jaws)
 
-    def _jaws(self, drives: list[Element]) -> tuple[Jaw, ...]:
-        """The jaws, whose masses are those of what they are in."""
-        holder = self.nests[0][0] if self.nests else ""
-        jaws = JawReader(self.document, self._merged, self.nest, drives).jaws(self.jaws, holder)
-        if jaws:
-            self.masses[holder] += sum(jaw.mass for jaw in jaws)
-        return jaws
-
-    def _merged(self, geom: Element) -> Values:
+    def _merged(self, geom: Element, inherited: str) -> Values:
         """The attributes of a geom, with those of its class."""
-        return {
-            **UNSET,
-            **self.classes.get(geom.attributes.get("class", ""), {}),
-            **geom.attributes,
-        }
+        of = geom.attributes.get("class", inherited)
+        return {**self.classes.get(of, UNSET), **geom.attributes}
 
     def _wrong(self, element: Element, what: str, valid: str) -> None:
         self.document.wrong(element, what, valid)
@@ -171,10 +158,9 @@ class _Reader:
         for child in body.all("body"):
             called = self.document.name(child, self.bodies)
             self.bodies.add(called)
-            joint = child.first("joint")
-            if joint is not None and joint.attributes.get("name") not in JOINTS:
-                self.jaws.append((child, name))
-            elif called in MOVING and called not in below:
+            if self.jaws.take(child, name, inherited):
+                continue
+            if called in MOVING and called not in below:
                 what = f"the body '{called}' is inside '{name}'"
                 self._wrong(child, what, "'head' inside 'carriage', 'tool' inside 'head'")
             else:
@@ -184,9 +170,7 @@ class _Reader:
         name = self.document.name(joint, self.joints)
         self.joints[name] = joint
         if "range" in joint.attributes:
-            self._wrong(
-                joint, "<joint> has 'range', which is not read", "none: layouts set its ends"
-            )
+            self._wrong(joint, "<joint> has 'range', which is not read", "none: layouts give it")
         where, kind, axis = JOINTS.get(name, ("", "", ()))
         if where != body:
             valid = ", ".join(f"'{j}' in '{b}'" for j, (b, *_) in JOINTS.items())
@@ -208,7 +192,7 @@ class _Reader:
         if of not in self.classes:
             valid = ", ".join(filter(None, self.classes)) or "a class of <default>"
             self._wrong(geom, f"the geom '{name}' is of the class '{of}'", valid)
-        values = {**self.classes.get(of, UNSET), **geom.attributes}
+        values = self._merged(geom, inherited)
         material = values.get("material")
         if material is not None and material not in self.materials:
             valid = did_you_mean(material, sorted(self.materials), "materials")
