@@ -19,7 +19,7 @@ from factory.theory.problem.robot_bodies import RobotBody
 JAW_PROFILE = SpeedProfile(0.1, 1.0)
 """The speed [m/s] and the acceleration [m/s²] of jaws."""
 
-SPARE = 0.03
+MARGIN = 0.03
 """How much longer a robot dwells than its jaws take [s]."""
 
 
@@ -27,19 +27,13 @@ def closing_time(body: RobotBody) -> float:
     """How long a robot dwells where it takes something [s]: until its jaws are closed, 0 without
     jaws."""
     longest = max((JAW_PROFILE.rest(jaw.stroke) for jaw in body.jaws), default=0.0)
-    return ceil(longest * 100 - 1e-6) / 100 + SPARE * bool(body.jaws)
+    return ceil(longest * 100 - 1e-6) / 100 + MARGIN * bool(body.jaws)
 
 
 def takes(operation: Operation, robot: int) -> bool:
     """Whether a robot (index) comes to an operation with empty hands and leaves with something."""
     slot = operation.robots.index(robot)
     return operation.before[slot] == NOPART != operation.after[slot]
-
-
-def releases(operation: Operation, robot: int) -> bool:
-    """Whether a robot (index) comes to an operation with something and leaves without."""
-    slot = operation.robots.index(robot)
-    return operation.before[slot] != NOPART == operation.after[slot]
 
 
 def with_closing(operations: Iterable[Operation], robots: Sequence[Robot]) -> tuple[Operation, ...]:

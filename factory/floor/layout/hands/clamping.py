@@ -17,7 +17,7 @@ from factory.floor.layout.hands.hand import AIR, Point3
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way
-from factory.floor.layout.hands.tips import shares
+from factory.floor.layout.hands.tips import TERMS, shares
 from factory.support.arrays import Array, Truth
 from factory.theory.problem.robot_bodies import Jaw
 
@@ -62,7 +62,7 @@ class Clamping:
         closed, fits = self._closed(robot, places.at, u)
         places, closed = places.chosen(fits), closed[fits]
         clamps = (Clamp(jaws, (tuple(row),)) for row in closed.tolist())
-        terms = np.array([clamp.gauge(u) for clamp in clamps]).reshape(len(closed), -1, 6)
+        terms = np.array([clamp.gauge(u) for clamp in clamps]).reshape(len(closed), TERMS, 6)
         label = held(self.holding.factory, robot)
         load = np.concatenate(np.broadcast_arrays(*self.holding.loads(label).about(places.at)))
         used = shares((terms @ load.swapaxes(0, 1)).swapaxes(1, 2)).max(axis=-1, initial=0.0)
