@@ -203,7 +203,7 @@ def instantiate(
         add_inertia(moved, each.drive)
         if each is not first:
             each.stops.limit(moved)
-        elif path.bends:
+        elif path.way:
             actuators.append(_bend(body, moved, actuators[-1], robot, path, each.stops))
     return body, actuators
 
