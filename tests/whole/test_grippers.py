@@ -74,7 +74,7 @@ def project(folder: Path, text: str = PRODUCT) -> Project:
     return read(file)
 
 
-LIFTED = PRODUCT.replace("clasp", "grab").replace("(0, 0.055, 0.01)", "(0, 0.056, 0.03)")
+LIFTED = PRODUCT.replace("clasp", "grab").replace("(0, 0.055, 0.01)", "(0, 0.042, 0.03)")
 ROUND = PRODUCT.replace("box = (0.024, 0.03, 0.02)", "cylinder = (0.012, 0.02)").replace(
     "0.055", "0.0521"
 )
@@ -111,6 +111,11 @@ class Watch:
 def test_fingers_close_before_the_robot_goes_and_touch_nothing(package: Path, text: str) -> None:
     """20 units, every robot's speed and gain drawn within 30 %."""
     made = project(package, text)
+    hand = made.layout.hand(2)
+    assert hand is not None and hand.clamp is not None
+    assert (hand.kind, made.factory.lowers(2)) == (
+        ("above", True) if text == LIFTED else ("below", False)
+    )
     simulation = Simulation(made.layout, RunRequest("mujoco", units=20, jitter=0.3, seed=1))
     watch = Watch(simulation)
     run = simulation.run([watch])
@@ -168,8 +173,9 @@ def test_jaws_that_close_too_little_or_too_far_fail_the_run(
     assert not run.succeeded and why in str(run.verdict), run.verdict
 
 
-def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
-    made = project(package)
+@pytest.mark.parametrize("text", [PRODUCT, LIFTED], ids=["dot", "on a lift"])
+def test_jaws_stay_within_the_boxes_that_were_certified(package: Path, text: str) -> None:
+    made = project(package, text)
     simulation = Simulation(made.layout, RunRequest("mujoco", units=2, jitter=0.3, seed=2))
     boxes = {limb.name: limb for limb in limbs(made.layout, 2)}
     off = list[float]()
@@ -183,6 +189,8 @@ def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
         for name in ("left", "right"):
             limb, geom = boxes[f"{name}/jaw"], m.geom(f"r3/{name}/jaw").id
             at = turn.T @ (d.geom_xpos[geom] - d.xpos[foot])
+            if text == LIFTED:
+                at[2] -= d.xpos[m.body("r3/head").id, 2] - d.xpos[foot, 2]
             low, high = at - m.geom_size[geom], at + m.geom_size[geom]
             off.append(float(max((limb.low - low).max(), (high - limb.high).max())))
 
@@ -190,16 +198,17 @@ def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
     assert max(off) < 1e-4
 
 
-def test_the_strength_of_jaws_is_friction_at_both_faces() -> None:
+@pytest.mark.parametrize("up", [1, -1], ids=["from below", "hanging"])
+def test_the_strength_of_jaws_is_friction_at_both_faces(up: int) -> None:
     jaws = tuple(
         Jaw(name, side, (-0.01, y, 0.0), (0.01, y + 0.004, 0.02), 0.02, 0.1, 0.0, 0.0, 25.0, 0.4)
         for name, side, y in (("left", 1, 0.03), ("right", -1, -0.034))
     )
-    clamp = Clamp(jaws, ((0.01, 0.01),))
+    clamp = Clamp(jaws, ((0.01, 0.01),), up)
 
     def used(force: tuple[float, ...], moment: tuple[float, ...] = (0.0, 0.0, 0.0)) -> float:
-        """At the middle of the clamp, 10 mm over the pad."""
-        about = np.array(moment) + np.cross((0.0, 0.0, 0.01), force)
+        """At the middle of the clamp, 10 mm over or under the pad."""
+        about = np.array(moment) + np.cross((0.0, 0.0, 0.01 * up), force)
         return float(shares((clamp.gauge((1.0, 0.0)) @ [*force, *about])[None])[0])
 
     assert used((0.0, 0.0, -10.0)) == pytest.approx(10 / (2 * 0.4 * 25))

@@ -72,8 +72,9 @@ def _box(layout: Layout, robot: Robot, clamp: Clamp, jaw: Jaw) -> dict[str, str]
     """Place and size of the box of an open jaw."""
     hand = layout.hand(robot.index)
     assert hand is not None
-    at = layout.mount(robot.index).reached(hand)[0]
-    ends = dict(clamp.boxes(at, open_=True))[jaw.name]
+    mount = layout.mount(robot.index)
+    boxes = clamp.boxes(mount.reached(hand)[0], hand.beam + mount.up, open_=True)
+    ends = dict(boxes)[jaw.name]
     middle = [round((low + high) / 2, 9) for low, high in zip(*ends, strict=True)]
     half = [round((high - low) / 2, 9) for low, high in zip(*ends, strict=True)]
     return {"pos": numbers(middle), "size": numbers(half)}

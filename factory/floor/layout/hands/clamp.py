@@ -1,4 +1,5 @@
-"""A clamp: jaws that close on both sides of what a hand holds, over its pad.
+"""A clamp: jaws that close on both sides of what a hand holds, over its pad or, of a hand above,
+under it.
 
 Jaws move across the heading. Closed, each is AIR off the widest place of the payload that its face
 is beside: as with pads, a weld stands for the pressure.
@@ -11,15 +12,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.floor.layout.dimensions import FINGER_LOW, FINGER_TOP
+from factory.floor.layout.dimensions import BEAM, FINGER_LOW, FINGER_TOP
 from factory.floor.layout.hands.tips import BESIDE, TERMS, TILTED, TURN, TWIST
 from factory.support.arrays import Array
 from factory.theory.problem.robot_bodies import Jaw
 
 Box = tuple[tuple[float, ...], tuple[float, ...]]
 
-PALM = "palm/finger"
-"""The limb on which jaws slide, made as fingers are."""
+PALM = "palm"
+"""What the name of the limb begins with on which jaws slide, made as fingers or beams are."""
+
+
+INSIDE = 5e-4
+"""How far a palm is inside the faces of the beam that it crosses [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,10 +34,12 @@ class Clamp:
     Attributes:
         jaws: both jaws.
         closed: for each tour how far each jaw closes on its payload [m].
+        up: 1 where jaws reach up from the pad, -1 where they hang.
     """
 
     jaws: tuple[Jaw, ...]
     closed: tuple[tuple[float, ...], ...]
+    up: int = 1
 
     @property
     def half(self) -> float:
@@ -40,24 +47,40 @@ class Clamp:
         return max(jaw.back for jaw in self.jaws)
 
     @property
+    def length(self) -> float:
+        """How far the jaws reach along the heading from the pad [m]."""
+        return max(max(-jaw.low[0], jaw.high[0]) for jaw in self.jaws)
+
+    @property
     def words(self) -> str:
         """The jaws, in words."""
         return f"two jaws, {min(jaw.force for jaw in self.jaws):g} N each"
 
     def boxes(
-        self, at: tuple[float, float, float], open_: bool = False
+        self, at: tuple[float, float, float], beam: float, open_: bool = False
     ) -> Iterator[tuple[str, Box]]:
         """The boxes of the palm and of the jaws, each jaw `open_` or with all its way from open to
-        closed, by their names; `at`: where the pad touches, in the frame of the robot [m]."""
+        closed, by their names. All in the frame of the robot [m].
+
+        Args:
+            at: where the pad touches.
+            beam: height of the lower edge of the beam, of a hand above.
+            open_: whether jaws are open.
+        """
         x, y, z = at
         begin, end = min(j.low[0] for j in self.jaws), max(j.high[0] for j in self.jaws)
-        yield PALM, ((x + begin, y - self.half, FINGER_LOW), (x + end, y + self.half, FINGER_TOP))
+        low, high = FINGER_LOW, FINGER_TOP
+        if self.up < 0:
+            low, high = beam + INSIDE, beam + BEAM - INSIDE
+        name = f"{PALM}/{'finger' if self.up > 0 else 'beam'}"
+        yield name, ((x + begin, y - self.half, low), (x + end, y + self.half, high))
         for number, jaw in enumerate(self.jaws):
             farthest = max(closed[number] for closed in self.closed)
             face = jaw.opening - farthest * (not open_)
             near, far = sorted((y + jaw.side * face, y + jaw.side * jaw.back))
-            low = x + jaw.low[0], near, FINGER_TOP
-            yield jaw.name, (low, (x + jaw.high[0], far, z + jaw.high[2]))
+            tip = z + self.up * jaw.high[2]
+            foot, top = (FINGER_TOP, tip) if self.up > 0 else (tip, beam)
+            yield jaw.name, ((x + jaw.low[0], near, foot), (x + jaw.high[0], far, top))
 
     def gauge(self, heading: tuple[float, float], tour: int = 0) -> Array:
         """What a load uses of the strength of the jaws on a tour, as `Tip.gauge` (11, 6): from a
@@ -72,7 +95,8 @@ class Clamp:
         (u, v), first = heading, self.jaws[0]
         across, along = np.array([-v, u, 0.0]), np.array([[u, v, 0.0], [0.0, 0.0, 1.0]])
         high = min(jaw.high[2] for jaw in self.jaws)
-        middle = np.array([(first.low[0] + first.high[0]) / 2, high / 2]) @ along + left * across
+        ahead = (first.low[0] + first.high[0]) / 2
+        middle = np.array([ahead, self.up * high / 2]) @ along + left * across
         about = np.hstack([-np.cross(middle, np.eye(3)).T, np.eye(3)])
         press = min(jaw.force for jaw in self.jaws)
         bears = 2 * press * min(jaw.grip for jaw in self.jaws)

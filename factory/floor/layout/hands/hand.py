@@ -34,9 +34,6 @@ STEM = 0.006
 ROOT = 0.01
 """How far a finger begins before the end of its arm [m]."""
 
-BEAM = 0.012
-"""How high a beam is [m]."""
-
 PAD = 0.0015
 """Thickness of a pad [m]."""
 

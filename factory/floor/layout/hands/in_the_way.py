@@ -96,7 +96,8 @@ class InTheWay:
         if kind == "behind":
             axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
         label = held(self.holding.factory, robot)
-        return self.clamping.places(robot, self.holding.places(label, kind, axis, way, radius), u)
+        places = self.holding.places(label, kind, axis, way, radius)
+        return self.clamping.places(robot, kind, places, u)
 
     def checks(
         self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
@@ -106,7 +107,7 @@ class InTheWay:
         key = robot, kind, tuple(frames), _digest(places)
         if key not in self._checked:
             free, first = self._looked_at(robot, label, kind, places, frames)
-            for column in self.clamping.columns(robot, places, frames[0][0]):
+            for column in self.clamping.columns(robot, kind, places, frames[0][0]):
                 beside, before = self._looked_at(robot, label, kind, column, frames)
                 free = {why: clear & beside[why] for why, clear in free.items()}
                 first = first | before
@@ -119,7 +120,7 @@ class InTheWay:
         """Distance that a hand at each place (n,) goes back, in any frame, until its carrier's next
         operation may start [m]."""
         waits = np.zeros(len(places))
-        for at in (places, *self.clamping.columns(robot, places, frames[0][0])):
+        for at in (places, *self.clamping.columns(robot, kind, places, frames[0][0])):
             for u, t in frames if len(places) else ():
                 going = self._going_on(robot, kind, at, u, t)
                 waits = np.maximum.reduce([waits, going, self.apart.crossing(robot, at, u, t)])
@@ -142,7 +143,7 @@ class InTheWay:
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
-            free["feeder"] &= self._beside_rod(label, places, *frames[0])
+            free["feeder"] &= self._beside_rod(robot, label, places, *frames[0])
         if self.holding.factory.drops(self.holding.last(robot).index):
             free["tray"] &= (
                 self._beside_slot(places, frames[0][0])
@@ -208,14 +209,15 @@ class InTheWay:
             (high if ahead > 0 else low)[:, axis] += ahead * ROOM
         return low, high
 
-    def _beside_rod(self, label: str, places: Places, u: Way, t: Way) -> Truth:
+    def _beside_rod(self, robot: int, label: str, places: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for its feeder's rod: behind a hand above it, or on the side away
-        from its tower, which stands against t."""
+        from its tower, which stands against t; jaws are on both sides."""
         solid, room = self.holding.product.solids[label], np.zeros(len(places), bool)
-        for (x, y), far in ((u, -1.0), (t, 1.0)):
+        length = self.clamping.length(robot)
+        for (x, y), far in ((u, -1.0), (t, 1.0))[: 1 if length else 2]:
             axis, way = (0, x) if x else (1, y)
             end = float((solid.high if way * far > 0 else solid.low)[axis])
-            left = abs(end - places.at[:, axis]) - halves(places.radius)
+            left = abs(end - places.at[:, axis]) - np.maximum(halves(places.radius), length)
             width = float((solid.high - solid.low)[:2].min())
             least = min(ROD, width / (8 if width <= SMALL else 4))
             room |= left >= least + BESIDE

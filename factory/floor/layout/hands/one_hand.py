@@ -73,7 +73,7 @@ class OneHand:
     def _kinds(self, tour: int) -> tuple[Kind, ...]:
         holding = self.in_the_way.holding
         if self._jaws(tour):
-            return ("below",)
+            return ("above", "below") if holding.factory.lowers(tour) else ("below", "above")
         if holding.is_fed(tour) and holding.is_carrier(tour):
             return "below", "behind"  # the tower of a hand above stands beside a feeder's part
         last = holding.last(tour)
@@ -306,7 +306,7 @@ class OneHand:
             any(bool(one.first[0]) for one in chosen),
             wait,
             tuple(float(one.covered[0]) if by == "suction" else 1.0 for one in chosen),
-            self.in_the_way.clamping.clamp(tours, [each[0] for each in points], frames[0][0]),
+            self.in_the_way.clamping.clamp(tours, kind, [p[0] for p in points], frames[0][0]),
         )
         both = zip(points, beams, strict=True)
         return tuple(replace(hand, places=places, beam=beam) for places, beam in both)
