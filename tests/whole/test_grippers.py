@@ -154,6 +154,13 @@ def test_two_worlds_and_two_steppings_agree(package: Path) -> None:
     )
 
 
+def test_robots_with_programs_of_their_own_close_their_jaws(package: Path) -> None:
+    request = RunRequest("mujoco", units=3, jitter=0.3, seed=1, distributed=True)
+    run = Simulation(project(package).layout, request).run([])
+    assert run.succeeded and run.physics is not None, run.verdict
+    assert run.physics.unintended_contacts == 0
+
+
 def spoiled(made: Project, by: float) -> Layout:
     """The layout with jaws that close too far by some length [m]."""
     hands = list(made.layout.hands)
