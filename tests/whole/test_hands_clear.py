@@ -15,10 +15,10 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout import clearance
 from factory.floor.layout.certificate import Exclusions
-from factory.floor.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.floor.layout.dimensions import BEAM, FINGER_TOP, PAYLOAD
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands.apart import LEVEL, HandsApart
-from factory.floor.layout.hands.hand import BEAM, Hand
+from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.outermost import outermost

@@ -19,7 +19,7 @@ from factory.apps.recovery import recover
 from factory.apps.runs.watched import watched
 from factory.engine.record.state import Event, State
 from factory.engine.simulation.mujoco.passing import Passing
-from factory.engine.simulation.mujoco.sliders import NEVER
+from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation

@@ -111,7 +111,7 @@ class _Search:
             press = PRESS[0] * (PRESS[1] / PRESS[0]) ** share
             robot = int(self.rng.choice(robots))
             under = self.under[robot]
-            there = here.changed(robot, self.proposed(robot, here.bends.get(robot)), under)
+            there = here.changed(robot, self.proposed(robot, here.detours.get(robot)), under)
             now = self.worth(here, size) + press * here.deep.sum()
             limit = now + INITIAL_TEMPERATURE * (1 - share) ** 2 * self.rng.exponential()
             if self.worth(there, size) > limit:
@@ -119,7 +119,7 @@ class _Search:
             there.look(under)
             if self.worth(there, size) + press * there.deep.sum() > limit:
                 continue
-            made = bent(self.layout, there.bends)
+            made = bent(self.layout, there.detours)
             if cycle_of(made, self.pace) > self.most:
                 continue
             here = there
@@ -141,8 +141,8 @@ class _Search:
             return None
         if kind < 0.2:
             return Detour(round(path.travel + abs(rng.normal()) * 0.1, 3))
-        if before and before.bends and kind < 0.6:
-            bend, rounding = before.bends[0], before.rounding
+        if before and before.first and kind < 0.6:
+            bend, rounding = before.first
             ends = path.reach + before.travel
             lengths = [bend.at, bend.across, ends - bend.end]
             if lengths[2] < 0.0:

@@ -97,7 +97,7 @@ class Placing:
     may be [m]; `hulls` (robots, 4): the boxes of all their regions [m]."""
 
     def __init__(self, ground: Floor, bends: Bends) -> None:
-        self.ground, self.bends = ground, bends
+        self.ground, self.detours = ground, bends
         count = len(ground.on)
         self.at, self.deep = np.zeros((count, 2)), np.zeros((count, count))
         self.swept, self.hulls = list[Swept](), np.zeros((count, 4))
@@ -109,9 +109,9 @@ class Placing:
     def changed(self, robot: int, detour: Detour | None, under: list[int]) -> Placing:
         """The same with another detour of a robot, with all robots that are `under` it."""
         made = copy(self)
-        made.bends = {number: bend for number, bend in self.bends.items() if number != robot}
+        made.detours = {number: bend for number, bend in self.detours.items() if number != robot}
         if detour is not None:
-            made.bends[robot] = detour
+            made.detours[robot] = detour
         made.at, made.deep, made.hulls = self.at.copy(), self.deep.copy(), self.hulls.copy()
         made.swept = self.swept.copy()
         made.swept[robot] = self.ground.swept(robot, detour)

@@ -27,6 +27,7 @@ from factory.engine.mjcf.driving import (
 from factory.engine.mjcf.elements import fill
 from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.engine.mjcf.insets import Insets, insets_of
+from factory.engine.mjcf.jaws import add_jaws
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.engine.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.engine.mjcf.robot_bodies import add_robots
@@ -187,6 +188,7 @@ def build_model(
     hanging = Hanging.of(layout)
     sliders = _sliders(layout, hanging, masses, settings)
     add_feeders(world, actuator, layout, hanging, sliders)
+    jaws = add_jaws(world, actuator, layout, settings)
     add_bins(world, layout, bins)
     add_parts(world, layout, hanging, copies, insets)
     add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
@@ -199,7 +201,7 @@ def build_model(
     fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
-    joints = len(factory.axes) + 2 + len(sliders) + sum(copies.values())
+    joints = len(factory.axes) + 2 + len(sliders) + jaws + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
 

@@ -79,6 +79,16 @@ def tool(robot: str) -> str:
     return f"{robot}/tool"
 
 
+def jaw(robot: str, name: str) -> str:
+    """The body of a robot's jaw, its joint and its actuator: `r3/left`."""
+    return f"{robot}/{name}"
+
+
+def jaw_face(robot: str, name: str) -> str:
+    """The geom of a robot's jaw: `r3/left/jaw`."""
+    return f"{robot}/{name}/jaw"
+
+
 def copy(label: str, number: int) -> str:
     """The name of a part's copy, counted from 1: `part1#2`."""
     return f"{label}#{number}"

@@ -72,8 +72,12 @@ class Pads:
         """The least distance [m] of a holder's pads from what some geoms are of, whose faces may
         have receded for an overlap (their number in the model is how far); 0 where one is in it.
         The nearest are tried first: spheres round geoms bound how near the others are."""
+        return self.nearest(d, self.of[holder].tolist(), geoms)
+
+    def nearest(self, d: mujoco.MjData, pads: Iterable[int], geoms: Index) -> float:
+        """As `apart`, of some geoms that hold."""
         m, least = self._m, FAR
-        for pad in self.of[holder].tolist():
+        for pad in pads:
             far = np.linalg.norm(d.geom_xpos[geoms] - d.geom_xpos[pad], axis=1)
             receded = self._receded[geoms]
             bound = far - m.geom_rbound[geoms] - m.geom_rbound[pad] - receded

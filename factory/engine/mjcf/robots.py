@@ -177,8 +177,10 @@ def instantiate(
     bodies = {inner.get("name"): inner for inner in body.iter("body")}
     towers = any(limb.name == "tower" for limb in held.limbs)
     _fit_arm(body, path, OWN_HAND | {CAP} if towers else OWN_HAND, model.made)
+    jaws = {jaw.name for jaw in model.made.jaws}
     turning = [limb for limb in held.limbs if not path.travels and limb.name in TOOL]
     others = [limb for limb in held.limbs if limb not in turning]
+    others = [limb for limb in others if limb.name.partition("/")[0] not in jaws]
     add_hand(body, bodies.get(head(robot)), held.styles, robot, others, model.name)
     add_hand(body, bodies.get(tool(robot)), held.styles, robot, turning, model.name)
     joints = {joint.get("name"): joint for joint in body.iter("joint")}
@@ -190,6 +192,8 @@ def instantiate(
     actuators: list[Element] = []
     for actuator in model.actuators:
         each = axes.get(actuator.get("joint") or "")
+        if actuator.get("joint") in jaws:
+            continue
         if each is None:
             _lock(body, f"{robot}/{actuator.get('joint')}")
             continue
@@ -199,7 +203,7 @@ def instantiate(
         add_inertia(moved, each.drive)
         if each is not first:
             each.stops.limit(moved)
-        elif path.bends:
+        elif path.way:
             actuators.append(_bend(body, moved, actuators[-1], robot, path, each.stops))
     return body, actuators
 
@@ -254,7 +258,8 @@ def _fit_arm(body: Element, path: Guidepath, without: Collection[str], made: Rob
             parents[geom].remove(geom)
     for lifted in body.iter("body"):
         if (lifted.get("name") or "").endswith("/head"):
-            mass = number(made.axis(LIFT_JOINT).mass)
+            beside = sum(jaw.mass for jaw in made.jaws)
+            mass = number(round(made.axis(LIFT_JOINT).mass - beside, 9))
             inertia = {"pos": "0 0 0.1", "mass": mass, "diaginertia": "2e-4 2e-4 2e-4"}
             lifted.insert(1, Element("inertial", inertia))
     for site in body.iter("site"):

@@ -89,13 +89,13 @@ def _rail(world: Element, layout: Layout, robot: int) -> None:
     room = Clearance(layout.clearance)
     (low, high), over = layout.ends(robot), layout.factory.carriage / 2 + room.stop
     face = SHOE + room.play
-    if path.bends:
+    if path.way:
         _bent_rail(world, name, path, (low - over, high + over))
     for kind, start, end, (side, bottom, top) in (
         ("rail", low - over, high + over, (RAIL[0], 0.0, RAIL[1])),
         ("buffer/A", low - over, low - face, (0.009, 0.008, 0.014)),
         ("buffer/B", high + face, high + over, (0.009, 0.008, 0.014)),
-    )[bool(path.bends) :]:
+    )[bool(path.way) :]:
         add_shown(
             world,
             f"{name}/{kind}",
@@ -110,7 +110,7 @@ def _rail(world: Element, layout: Layout, robot: int) -> None:
 def _bent_rail(world: Element, name: str, path: Guidepath, span: tuple[float, float]) -> None:
     """The rail of a guidepath with bends, in straight pieces."""
     (side, top), round_ = RAIL, np.linspace(-path.rounding, path.rounding, CORNER + 1)
-    corners = [at + off for bend in path.bends for at in (bend.at, bend.end) for off in round_]
+    corners = [at + off for at in path.all_corners for off in round_]
     ends = [path.carriage(x) for x in (span[0], *corners, span[1])]
     for number, ((x, y), (z, w)) in enumerate(pairwise(ends), start=1):
         half = atan2(w - y, z - x) / 2

@@ -13,7 +13,7 @@ from factory.floor.geometry.fused_bodies import FusedBodies, bodies_of
 from factory.floor.layout.chains import Chains, SoughtCurves
 from factory.floor.layout.exclusions import goes_early
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.way import Bend, Ways
+from factory.floor.layout.way import BendRows, BentWay, Ways, kept_in, rows_of
 from factory.support.settings import Settings
 from factory.support.tables import table_of
 from factory.theory.nets.history import firings
@@ -24,9 +24,6 @@ from factory.theory.plant.operation import Operation
 
 PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""
-
-Bent = tuple[tuple[Bend, ...], float]
-"""The bends of a guidepath, and their rounding [m]."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,7 @@ class MonitorSubject:
         wip: most units inside at once; None for any number.
         early: (operation, robot) where a robot goes ahead regardless of the settings, so that its
             hand is out of the way.
-        bends: by robot (index), the bends of its guidepath and their rounding [m].
+        ways: by robot (index), the bends of its guidepath and their rounding [m].
         chains: the robots whose first axes move several joints; None where there are none.
         word: the units that are made; None for all.
     """
@@ -59,12 +56,12 @@ class MonitorSubject:
     patience: float
     wip: int | None = None
     early: frozenset[tuple[int, int]] = frozenset()
-    bends: Mapping[int, Bent] = field(default_factory=dict, repr=False)
+    ways: Mapping[int, BentWay] = field(default_factory=dict, repr=False)
     word: Word | None = None
     chains: Chains | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        for name in ("places", "bends"):
+        for name in ("places", "ways"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     @classmethod
@@ -98,11 +95,8 @@ class MonitorSubject:
         marking = factory.net.initial_marking if start is None else start
         patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
         subject = cls(factory, goals, radii, places, settings, marking, patience, wip, early)
-        bent = {robot: path for robot, path in enumerate(layout.guidepaths) if path.bends}
-        if bent:
-            bends = {robot: (path.bends, path.rounding) for robot, path in bent.items()}
-            subject = replace(subject, bends=bends)
-        return replace(subject, chains=layout.chains)
+        ways = {robot: path.way for robot, path in enumerate(layout.guidepaths) if path.way}
+        return replace(subject, ways=ways, chains=layout.chains)
 
     @classmethod
     def of_run(cls, simulation: Recordable) -> MonitorSubject:
@@ -124,8 +118,7 @@ class MonitorSubject:
         do: of chains, or else of guidepaths with bends."""
         if self.chains is not None:
             return self.chains.robots, self.chains.sought
-        rows = [*self.bends.values()]
-        return (*self.bends,), Ways.of([row for row, _ in rows], [round_ for _, round_ in rows])
+        return (*self.ways,), Ways.bent(self.ways.values())
 
     @cached_property
     def counts(self) -> Mapping[int, int]:
@@ -210,17 +203,13 @@ class MonitorTable:
     places: Mapping[str, tuple[float, float, float]]
     patience: float
     early: tuple[tuple[int, int], ...]
-    bends: tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...] = ()
+    bends: BendRows = ()
 
     @classmethod
     def of(cls, subject: MonitorSubject) -> MonitorTable:
         """The fields of a subject."""
         same = subject.goals, subject.radii, subject.places, subject.patience
-        bends = tuple(
-            (robot, rounding, tuple((bend.at, bend.across) for bend in row))
-            for robot, (row, rounding) in subject.bends.items()
-        )
-        return cls(*same, tuple(sorted(subject.early)), bends)
+        return cls(*same, tuple(sorted(subject.early)), rows_of(subject.ways))
 
     def subject(
         self, factory: Factory, settings: Settings, start: Marking, wip: int | None
@@ -230,5 +219,4 @@ class MonitorTable:
         if [*map(len, self.goals)] != slots or len(self.radii) != len(slots):
             raise ValueError("its goals are not those of its PAG")
         same = factory, self.goals, self.radii, self.places, settings, start, self.patience, wip
-        bends = {r: (tuple(Bend(*bend) for bend in row), far) for r, far, row in self.bends}
-        return MonitorSubject(*same, frozenset(self.early), bends)
+        return MonitorSubject(*same, frozenset(self.early), kept_in(self))

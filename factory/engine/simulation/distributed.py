@@ -291,6 +291,8 @@ class DistributedSupervisor:
         if not bundle.at_goal(x)[0] or np.abs(v).max() >= STILL:
             process.clock = 0.0
             return False
+        if step.operation.dwell and not process.clock:
+            self.world.arrive([step.operation])
         done = process.clock >= step.operation.dwell - 1e-9
         process.clock += process.period * self.timestep
         return done

@@ -57,6 +57,9 @@ class IdealWorld:
         wanted = self.word.demand is not None or unit < self.word.most
         return bool(operation.inputs) or (wanted and self.word.lets_in(unit))
 
+    def arrive(self, operations: Sequence[Operation]) -> None:
+        """Nothing takes hold of parts."""
+
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:

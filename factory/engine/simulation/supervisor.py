@@ -272,14 +272,24 @@ class Supervisor:
         active = self.active
         asked = there if bundle.clocked is None else there & ~bundle.clocked
         clocks = self.tick * asked.astype(float)
+        begun = asked & (bundle.dwell > 0.0)
         if active.clocks is not None:
             clocks += active.clocks
+            begun &= active.clocks == 0.0
+        if begun.any():
+            self.world.arrive(self._operations(begun))
         active.clocks, finished = clocks, bundle.finished(there, clocks)
         hooks = self.world.hooks
         stays = there & still & ~finished & (not (hooks.sensors or hooks.each_step))
         active.clocked = frozenset(compress(active.numbers, stays.tolist()))
         active.bundle, _ = self.bundles.of(active.numbers, active.clocked)
         return finished
+
+    def _operations(self, chosen: Truth) -> list[Operation]:
+        """The operations among some active modes (modes,)."""
+        operations = self.factory.operations
+        numbers = compress(self.active.numbers, chosen.tolist())
+        return [operations[number] for number in numbers if number < len(operations)]
 
     def _passes(self, number: int) -> bool:
         """Whether a mode at its goal may end; a stage always may."""

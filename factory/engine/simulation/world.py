@@ -141,6 +141,9 @@ class World(Protocol):
         """Whether the parts that an operation needs are there: a feeder presents one, the outfeed
         is free."""
 
+    def arrive(self, operations: Sequence[Operation]) -> None:
+        """Robots have come to the goals of operations, where they dwell."""
+
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Start and end operations now."""
 

@@ -23,6 +23,11 @@ class Detour:
     bends: tuple[Bend, ...] = ()
     rounding: float = 0.0
 
+    @property
+    def first(self) -> tuple[Bend, float] | None:
+        """Its first bend, and the rounding [m]; None where it is straight."""
+        return (self.bends[0], self.rounding) if self.bends else None
+
     def of(self, path: Guidepath) -> Guidepath:
         """A guidepath with this travel and these bends."""
         return replace(path, travel=self.travel, bends=self.bends, rounding=self.rounding)

@@ -23,6 +23,9 @@ PAYLOAD = 0.1
 FINGER = 0.01
 """Width of a finger, and of the bars and beams of tall hands."""
 
+BEAM = 0.012
+"""How high a beam is."""
+
 STUB = 0.03
 """The shortest arm, from the middle of the mast."""
 

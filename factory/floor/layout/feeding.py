@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import hypot
 
 from factory.floor.layout.dimensions import (
+    BEAM,
     BOOM,
     BOOM_HEIGHT,
     FINGER,
@@ -19,7 +20,6 @@ from factory.floor.layout.dimensions import (
     Clearance,
 )
 from factory.floor.layout.guidepath import Extent, Feeder, hull
-from factory.floor.layout.hands.hand import BEAM
 from factory.floor.layout.layout import Layout
 from factory.theory.plant.operation import Operation
 

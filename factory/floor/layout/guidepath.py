@@ -14,7 +14,7 @@ from math import sqrt
 
 import numpy as np
 
-from factory.floor.layout.way import Bend, way_of
+from factory.floor.layout.way import Bend, BentWay, way_of
 from factory.support.arrays import Array
 
 Box = tuple[float, float, float, float]
@@ -89,6 +89,11 @@ class Guidepath:
         return self.turn is None
 
     @property
+    def way(self) -> BentWay | None:
+        """Its bends and their rounding; None where it is straight."""
+        return (self.bends, self.rounding) if self.bends else None
+
+    @property
     def length(self) -> float:
         """B - A [m]."""
         return self.reach + self.travel
@@ -101,8 +106,12 @@ class Guidepath:
     @property
     def corners(self) -> list[float]:
         """The arc lengths of its corners, were they not round."""
-        every = (at for bend in self.bends for at in (bend.at, bend.end))
-        return [at for at in every if at < self.length]
+        return [at for at in self.all_corners if at < self.length]
+
+    @property
+    def all_corners(self) -> list[float]:
+        """The same with those of its line beyond its end."""
+        return [at for bend in self.bends for at in (bend.at, bend.end)]
 
     @property
     def sideways(self) -> float:

@@ -140,7 +140,10 @@ def _taken(outlet: Outlet) -> tuple[float, ...]:
     hand, path = outlet.layout.hand(outlet.robot), _path(outlet)
     if hand is None or hand.kind != "above":
         return inf, inf, -inf, -inf
-    half = max(hand.radius, hand.width / 2) + BESIDE_HAND
+    half = np.full(2, max(hand.radius, hand.width / 2) + BESIDE_HAND)
+    if hand.clamp is not None:
+        sides = hand.clamp.length * np.abs(path.heading) + hand.half * np.abs(path.side)
+        half = np.maximum(half, sides + BESIDE_HAND)
     shift = outlet.layout.visits[outlet.leaf.index, outlet.robot].shift
     at = np.array(hand.places[0][:2]) - shift - _solid(outlet).position[:2]
     ends = [at - half, at + half]

@@ -84,7 +84,7 @@ class Homeward(Nearness):
             return replace(there, sweeps=(((at, home), (low, high)),))
 
         def clear(at: float) -> bool:
-            if layout.guidepaths[robot].bends:
+            if layout.guidepaths[robot].way:
                 return judged(goes(at), its, needed) is None
             return nearest(goes(at), its, on_all) is None
 

@@ -110,9 +110,8 @@ class Layout(Keeping, Pictured):
         """The robots (index) whose first axes move several joints, and the curves of these."""
         if self.chains is not None:
             return self.chains.robots, self.chains.curves
-        bent = {n: path for n, path in enumerate(self.guidepaths) if path.bends}
-        rows = [(path.bends, path.rounding) for path in bent.values()]
-        return (*bent,), Ways.of([row for row, _ in rows], [round_ for _, round_ in rows])
+        ways = {n: path.way for n, path in enumerate(self.guidepaths) if path.way}
+        return (*ways,), Ways.bent(ways.values())
 
     @cached_property
     def stems(self) -> frozenset[int]:

@@ -314,7 +314,7 @@ def _way(layout: Layout, robot: int) -> tuple[Array, Guidepath | None]:
     at all if it turns."""
     path = layout.guidepaths[robot]
     ahead = -1.0 if path.travels else 0.0
-    return np.array([*path.heading, 0.0]) * ahead, path if path.bends else None
+    return np.array([*path.heading, 0.0]) * ahead, path if path.way else None
 
 
 def station(operation: int) -> int:

@@ -11,10 +11,11 @@ no more than 2a while it brakes there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil
+from typing import Protocol
 
 import numpy as np
 
@@ -88,6 +89,12 @@ class Ways:
         ends[:, 0], ends[:, 1:-1:2], ends[:, 2:-1:2] = -FAR, corner - reach, corner + reach
         return cls(ends, middle, terms, radius)
 
+    @classmethod
+    def bent(cls, ways: Iterable[BentWay]) -> Ways:
+        """Those of bent ways."""
+        rows = [*ways]
+        return cls.of([row for row, _ in rows], [rounding for _, rounding in rows])
+
     def at(self, rows: Index, x: Array) -> tuple[Array, Array, Array]:
         """Places, first and second derivatives (..., m, 2) of the ways `rows` (m,) at coordinates
         (..., m) [m]."""
@@ -154,6 +161,35 @@ class Ways:
         for number, bent in enumerate((second != 0.0).any(axis=1)):
             points = (begin, turn, end) if bent else (begin, end)
             yield np.stack([side[number] for side in points])
+
+
+BentWay = tuple[tuple[Bend, ...], float]
+"""The bends of a guidepath, and their rounding [m]."""
+
+BendRows = tuple[tuple[int, float, tuple[tuple[float, float], ...]], ...]
+"""Bent ways as they are kept in a file: a number, the rounding, where each bend is and how far
+across it leads."""
+
+
+class KeptWays(Protocol):
+    """What keeps bent ways in a file."""
+
+    @property
+    def bends(self) -> BendRows:
+        """The ways."""
+
+
+def rows_of(ways: Mapping[int, BentWay]) -> BendRows:
+    """Bent ways by number, as they are kept."""
+    return tuple(
+        (number, rounding, tuple((bend.at, bend.across) for bend in row))
+        for number, (row, rounding) in ways.items()
+    )
+
+
+def kept_in(table: KeptWays) -> dict[int, BentWay]:
+    """The bent ways that a table keeps, by number."""
+    return {n: (tuple(Bend(*bend) for bend in row), far) for n, far, row in table.bends}
 
 
 @lru_cache(maxsize=4096)

@@ -21,6 +21,7 @@ from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.nets.threaded import Redistribution, Slot, ThreadedNet
 from factory.theory.plant.factory import NO_PARENT, Factory
+from factory.theory.plant.gripping import with_closing
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import OperationId, PlaceId, RobotId
@@ -132,10 +133,11 @@ def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[in
     every = ((o, turn) for part in (makes, drops) for turn in range(len(turns)) for o in part)
     each = ((i, turn) for i, turn in every if (turn, base.operations[i].turn) in unit)
     number = {one: OperationId(n) for n, one in enumerate(each)}
-    operations = tuple(
+    each_made = (
         for_unit(o := base.operations[i], n, unit[turn, o.turn], turns[turn])
         for (i, turn), n in number.items()
     )
+    operations = with_closing(each_made, robots)
     programs: list[list[OperationId]] = [[] for _ in robots]
     tours = sorted(
         (when[tour[-1]], robot, tour)

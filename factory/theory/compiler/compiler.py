@@ -19,6 +19,7 @@ from factory.theory.compiler.expanding import Node, expand
 from factory.theory.compiler.turning import check_turned
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import NO_PARENT, Factory
+from factory.theory.plant.gripping import with_closing
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import OperationId, RobotId
@@ -70,7 +71,8 @@ def compile_nodes(
     _check_types(nodes, output, catalogue)
     draft = _Draft(nodes, catalogue, approaches)
     draft.compile(pag, output)
-    robots, operations = draft.robots(), tuple(draft.operations)
+    robots = draft.robots()
+    operations = with_closing(draft.operations, robots)
     troubles = draft.troubles or [
         *check_prepared(robots, operations),
         *check_turned(pag, robots, operations),

@@ -107,6 +107,45 @@ class RobotAxis:
 
 
 @dataclass(frozen=True, slots=True)
+class Jaw:
+    """A finger of a gripper: an axis that grips move, not modes. It closes on what is taken, and
+    opens where that has changed hands.
+
+    Attributes:
+        name: of its body, joint, geom and actuator.
+        side: +1 for one on the left of the robot's heading, which closes to the right; else -1.
+        low, high: corners of its box from the nest, open (3,) [m].
+        stroke: how far it closes at the most [m].
+        mass: of it [kg].
+        armature: inertia of its motor [kg].
+        friction: dry friction [N].
+        force: what it presses with [N].
+        grip: coefficient of friction of its face.
+    """
+
+    name: str
+    side: int
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+    stroke: float
+    mass: float
+    armature: float
+    friction: float
+    force: float
+    grip: float
+
+    @property
+    def opening(self) -> float:
+        """Distance of its face from the nest, open [m]."""
+        return self.low[1] if self.side > 0 else -self.high[1]
+
+    @property
+    def back(self) -> float:
+        """Distance of its back from the nest, open [m]."""
+        return self.high[1] if self.side > 0 else -self.low[1]
+
+
+@dataclass(frozen=True, slots=True)
 class RobotBody:
     """A robot without its hand.
 
@@ -114,11 +153,13 @@ class RobotBody:
         carriage: width W of the square about its mast that all of it below the arms is in [m].
         mass: of all of it [kg].
         axes: its joints, from the carriage up.
+        jaws: the fingers of its gripper, one on each side; nothing where it holds by pads.
     """
 
     carriage: float
     mass: float
     axes: tuple[RobotAxis, ...]
+    jaws: tuple[Jaw, ...] = ()
 
     def axis(self, joint: str) -> RobotAxis:
         """The axis of a joint that it has."""

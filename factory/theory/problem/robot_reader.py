@@ -26,6 +26,7 @@ from factory.theory.problem.robot_bodies import (
     RobotAxis,
     RobotBody,
 )
+from factory.theory.problem.robot_jaws import JawReader
 from factory.theory.problem.robot_schema import (
     FITTED,
     HAND,
@@ -77,8 +78,8 @@ def read_body(name: str, path: Path) -> RobotBody:
 
 class _Reader:
     """Reads one file. What was met so far: `classes` of geoms, `materials`, the body of each of
-    the `geoms`, `joints`, `nests`; `masses`: of each body with a joint [kg]; `wide`: width of the
-    carriage, and `shown`: what is seen of it [m]."""
+    the `geoms`, `joints`, `nests`, `jaws`; `masses`: of each body with a joint [kg]; where the
+    `nest` is, `wide`: width of the carriage, and `shown`: what is seen of it [m]."""
 
     def __init__(self, document: RobotDocument) -> None:
         self.document = document
@@ -87,7 +88,8 @@ class _Reader:
         self.geoms, self.bodies = dict[str, str](), set[str]()
         self.masses = dict.fromkeys(MOVING, 0.0)
         self.joints = dict[str, Element]()
-        self.nests = list[tuple[str, str]]()
+        self.nests, self.nest = list[tuple[str, str]](), [0.0, 0.0, 0.0]
+        self.jaws = JawReader(document, self._merged)
         self.wide = 0.0
         self.shown = list[tuple[Element, str, list[float], list[float]]]()
 
@@ -109,13 +111,21 @@ class _Reader:
             self.document.stop()
         self._inside(bodies[0], "carriage", "")
         self._fittings(root)
-        axes = self._axes(bodies[0], sections["actuator"])
+        jaws = self.jaws.read(self.nests[0][0] if self.nests else "", self.nest, root)
+        for jaw in jaws:
+            self.masses[self.nests[0][0]] += jaw.mass
+        axes = self._axes(bodies[0], self.jaws.others(sections["actuator"]))
         self.document.stop()
         wide = max(CARRIAGE, 0.002 * ceil(self.wide * 500 - 1e-6))
         for shown in self.shown:
             self._stands_out(*shown, wide / 2)
         self.document.stop()
-        return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes)
+        return RobotBody(round(wide, 6), round(sum(self.masses.values()), 9), axes, jaws)
+
+    def _merged(self, geom: Element, inherited: str) -> Values:
+        """The attributes of a geom, with those of its class."""
+        of = geom.attributes.get("class", inherited)
+        return {**self.classes.get(of, UNSET), **geom.attributes}
 
     def _wrong(self, element: Element, what: str, valid: str) -> None:
         self.document.wrong(element, what, valid)
@@ -141,11 +151,15 @@ class _Reader:
             self._joint(joint, name)
         for geom in body.all("geom"):
             self._geom(geom, name if name in MOVING else "", inherited)
-        self.nests += [(name, site.attributes.get("name", "")) for site in body.all("site")]
+        for site in body.all("site"):
+            self.nests.append((name, site.attributes.get("name", "")))
+            self.nest = numbers(site.attributes.get("pos", "0 0 0"))
         below = MOVING[MOVING.index(name) + 1 :][:1] if name in MOVING else ()
         for child in body.all("body"):
             called = self.document.name(child, self.bodies)
             self.bodies.add(called)
+            if self.jaws.take(child, name, inherited):
+                continue
             if called in MOVING and called not in below:
                 what = f"the body '{called}' is inside '{name}'"
                 self._wrong(child, what, "'head' inside 'carriage', 'tool' inside 'head'")
@@ -155,6 +169,8 @@ class _Reader:
     def _joint(self, joint: Element, body: str) -> None:
         name = self.document.name(joint, self.joints)
         self.joints[name] = joint
+        if "range" in joint.attributes:
+            self._wrong(joint, "<joint> has 'range', which is not read", "none: layouts give it")
         where, kind, axis = JOINTS.get(name, ("", "", ()))
         if where != body:
             valid = ", ".join(f"'{j}' in '{b}'" for j, (b, *_) in JOINTS.items())
@@ -176,7 +192,7 @@ class _Reader:
         if of not in self.classes:
             valid = ", ".join(filter(None, self.classes)) or "a class of <default>"
             self._wrong(geom, f"the geom '{name}' is of the class '{of}'", valid)
-        values = {**self.classes.get(of, UNSET), **geom.attributes}
+        values = self._merged(geom, inherited)
         material = values.get("material")
         if material is not None and material not in self.materials:
             valid = did_you_mean(material, sorted(self.materials), "materials")

@@ -52,7 +52,7 @@ MAY_HAVE: Mapping[str, tuple[str, ...]] = {
         *("name", "class", "type", "size", "pos", "mass", "material", "rgba"),
         *("contype", "conaffinity", "condim", "friction", "group"),
     ),
-    "joint": ("name", "type", "axis", "armature", "frictionloss"),
+    "joint": ("name", "type", "axis", "range", "armature", "frictionloss"),
     "site": ("name", "pos", "size", "group", "rgba"),
     "position": ("name", "joint", "kp", "kv", "forcerange"),
 }
@@ -72,7 +72,7 @@ COUNTS: Mapping[str, tuple[int, int]] = {
     **dict.fromkeys(("size", "friction"), (1, 3)),
     **dict.fromkeys(("pos", "axis"), (3, 3)),
     "rgba": (4, 4),
-    "forcerange": (2, 2),
+    **dict.fromkeys(("forcerange", "range"), (2, 2)),
     **dict.fromkeys(("mass", "armature", "frictionloss", "kp", "kv", "condim", "group"), (1, 1)),
     **dict.fromkeys(("contype", "conaffinity"), (1, 1)),
     **dict.fromkeys(("specular", "shininess", "emission", "reflectance"), (1, 1)),

@@ -99,7 +99,7 @@ def test_branches_that_come_too_near_are_seen(straight: Layout) -> None:
 def certified_or_none(straight: Layout, placing: Placing) -> Layout | None:
     from factory.floor.layout.bending import bent
 
-    layout = bent(straight, placing.bends)
+    layout = bent(straight, placing.detours)
     return None if [*crowded(layout)] else layout
 
 

@@ -6,6 +6,8 @@
 * A hand-over: `world.py` (`MujocoWorld.apply`), `parts.py` (`Parts.hand_over`), `holdings.py`
   (`Holdings.move`), then `welds.py` (`Welds.write`), which switches welds and contact masks.
 * Supply and removal: `feeders.py`, `sliders.py`, `supply.py`, `passing.py`, `outfeed.py`.
+* Axes that go from end to end, each stroke written ahead as a whole (`strokes.py`): sliders, and
+  the jaws of grippers (`jaws.py`).
 * Checks that change nothing: `inspection.py`, `soundness.py`, `probing.py`, `pressing.py`,
   `product_error.py`.
 """

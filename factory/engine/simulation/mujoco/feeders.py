@@ -18,7 +18,8 @@ from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.parts import presented_at
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.mujoco.passing import Passing
-from factory.engine.simulation.mujoco.sliders import NEVER, Sliders
+from factory.engine.simulation.mujoco.sliders import Sliders
+from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.mujoco.supply import Supply, TakenBack
 from factory.engine.simulation.mujoco.welds import Place, Welds
 from factory.floor.layout.exclusions import coordinated

@@ -13,6 +13,7 @@ from factory.engine.simulation.mujoco.axes import Axes
 from factory.engine.simulation.mujoco.courses import AHEAD, Course, Follower, along, planned
 from factory.engine.simulation.mujoco.curves import Curves
 from factory.engine.simulation.mujoco.drives import Drives
+from factory.engine.simulation.mujoco.jaws import Jaws
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.outfeed import Outfeed
 from factory.engine.simulation.mujoco.sleep import Sleep
@@ -76,6 +77,7 @@ class Motion:
         robots: the references of robots, which follow the active modes.
         outfeed: the tray and the shutter of the outfeed.
         sliders: the sliders of feeders.
+        jaws: the jaws of grippers.
         drives: the setpoints of the drives.
         guides: the friction of the axes.
         sleep: which bodies the engine skips.
@@ -109,6 +111,7 @@ class Motion:
         tray = Follower(x, v, self.drives, self.settings.steps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
         self.sliders = Sliders(arrays, d, model, self.sleep)
+        self.jaws = Jaws(arrays, d, model, self.sleep)
         self.active: Index = np.empty(0, np.intp)
         self.plan = np.zeros((4, len(self.axes)))
 
@@ -171,6 +174,7 @@ class Motion:
         if bundle is not None:
             self.robots.show(ticks)
         self.sliders.show(ticks * self.settings.steps)
+        self.jaws.show(ticks * self.settings.steps)
         self.stepping.advance(ticks * self.settings.steps)
         return ticks
 
@@ -262,6 +266,7 @@ class Motion:
         if self.outfeed.follower.left:
             self.outfeed.follower.show(1)
         self.sliders.show(0)
+        self.jaws.show(0)
         axes = np.flatnonzero(self.plan[2:].any(axis=0))
         if len(axes):
             begun, *_, a = self.plan[:, axes]

@@ -182,6 +182,8 @@ class Strength:
 
 def _told(hand: Hand) -> str:
     """The grip of a hand, in words."""
+    if hand.clamp is not None:
+        return hand.clamp.words
     what = {"suction": "suction pad", "pin": "pin"}[hand.tip]
     tips = f"two {what}s" if len(hand.places) > 1 else f"a {what}"
     return f"{tips}, radius {1e3 * hand.radius:g} mm"

@@ -93,6 +93,12 @@ class PadGaps:
             if not self._d.eq_active[self._welds[holder]].any():
                 self._pads_of(holder, weld, bodies)
 
+    def beside(self, jaws: Iterable[int], bodies: Sequence[int]) -> None:
+        """Measure jaws (geoms) that have closed on bodies, each by itself."""
+        geoms = self._pads.geoms(bodies)
+        for jaw in jaws:
+            self.largest = max(self.largest or 0.0, self._pads.nearest(self._d, [jaw], geoms))
+
     def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
         m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
         frame = self._frames.chosen(np.array([weld]))

@@ -23,9 +23,10 @@ from factory.engine.simulation.mujoco.inspection import Inspection
 from factory.engine.simulation.mujoco.model_arrays import ModelArrays
 from factory.engine.simulation.mujoco.motion import Motion
 from factory.engine.simulation.mujoco.parts import Parts
-from factory.engine.simulation.mujoco.sliders import NEVER, ROUNDED
+from factory.engine.simulation.mujoco.sliders import ROUNDED
 from factory.engine.simulation.mujoco.soundness import Soundness
 from factory.engine.simulation.mujoco.stepping import SingleSteps
+from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
 from factory.support.arrays import Array, Index
@@ -101,6 +102,7 @@ class MujocoWorld:
             if request.fast and model.layout.chains is None
             else SingleSteps(*stepping)
         )
+        self.motion.jaws.begin(self._in_hand)
         self.motion.begin(self.parts.holdings.loads())
         soundness.look()
         soundness.probe()
@@ -160,6 +162,10 @@ class MujocoWorld:
             self._hand_over(ended)
             self.hooks.tell_ended()
 
+    def arrive(self, operations: Sequence[Operation]) -> None:
+        """Let jaws close on what robots take where they dwell."""
+        self.motion.jaws.close(operations)
+
     def _hand_over(self, ended: Sequence[Job]) -> None:
         self.parts.complete(ended)
         for operation, unit in ended:
@@ -174,7 +180,16 @@ class MujocoWorld:
         labels = [label for operation, _ in ended for label in operation.after]
         self.motion.load(robots, [self.model.masses.get(label, 0.0) for label in labels])
         self.parts.hand_over(ended)
+        operations = [operation for operation, _ in ended]
+        self.motion.jaws.close(operations)  # of robots that nobody has told to have arrived
+        for holder, faces in self.motion.jaws.taken(operations).items():
+            self.parts.welds.pads.beside(faces, [*self.parts.holdings.hand(holder).values()])
+        self.motion.jaws.tend(self._in_hand)
         self.supplied = True
+
+    def _in_hand(self, robot: int) -> Collection[str]:
+        """The labels in a robot's hand (index)."""
+        return self.parts.holdings.hand(robot)
 
     def step(
         self, bundle: Bundle | None, axes: Index, ticks: int = 1, until: Collection[Past] = ()
@@ -265,6 +280,7 @@ class MujocoWorld:
         """Make the checks that follow a change of modes, and come about once in a stride."""
         self._unseen = 0
         self.inspection.welds()
+        self.motion.jaws.tend(self._in_hand)
         self.supplied |= self.parts.feeders.tend(self.motion.active)
         if self.parts.joining.waiting and self.dropped is None:
             self.parts.joining.settle(self.time)

@@ -4,5 +4,6 @@
 places of one robot. The places are those of `surfaces.py` and `places.py`, `groups.py` pairs and
 ranks them, and `in_the_way.py` and `apart.py` rule out those where a hand would touch something.
 `hand.py` is the value; `tips.py` and `gauges.py` say how much it bears; `limbs.py` and `mounted.py`
-say which room it takes. Where nothing holds, `nearest.py` finds the nearest miss.
+say which room it takes; `clamp.py` and `clamping.py` the same of jaws that close. Where nothing
+holds, `nearest.py` finds the nearest miss.
 """

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from factory.floor.layout.dimensions import FINGER, FINGER_TOP, PAYLOAD
-from factory.floor.layout.hands.hand import BEAM, Hand, Kind
+from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_TOP, PAYLOAD
+from factory.floor.layout.hands.hand import Hand, Kind
 from factory.floor.layout.hands.holding import Holding
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back, halves, reach
@@ -57,7 +57,7 @@ class HandsApart:
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         hand = self.hand_of(carrier, t)
         if hand.kind == "below" and kind == "below":
-            half = max(FINGER / 2, hand.radius) + BESIDE
+            half = hand.half + BESIDE
             free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
                 places.radius
             ) + half
@@ -84,7 +84,7 @@ class HandsApart:
             return np.zeros(len(places))
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         over = (places.at[:, axis] - hand.places[0][axis]) * side
-        half = max(MAST / 2, float(halves(np.array(hand.radius))))
+        half = max(MAST / 2, float(halves(np.array(hand.radius))), hand.half * bool(hand.clamp))
         return np.maximum(0.0, over + halves(places.radius) + half + BESIDE)
 
     def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:

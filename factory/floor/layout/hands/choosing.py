@@ -165,8 +165,11 @@ class Hands:
                 self.one_hand.chosen(unlike, frames)
             )
             covered = tuple(hands[0].covered[n] for n in which) if hands else ()
+            clamp = hands[0].clamp if hands else None
+            if clamp is not None:
+                clamp = replace(clamp, closed=tuple(clamp.closed[n] for n in which))
             self._chosen[tours, frames] = tuple(
-                replace(hands[n], covered=covered) for n in which if hands
+                replace(hands[n], covered=covered, clamp=clamp) for n in which if hands
             ) or (self._nowhere(held(self.holding.factory, tours[0])),) * len(tours)
         return self._chosen[tours, frames]
 

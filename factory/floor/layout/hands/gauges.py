@@ -25,6 +25,8 @@ def outward(hand: Hand, heading: Point2) -> Array:
 def gauge(hand: Hand, heading: Point2, tour: int = 0) -> Array:
     """From a force [N] and a moment [Nm] about the middle of a hand's tips to the terms of what
     they use of its strength on a tour (11, 6), as `tips.shares` takes them."""
+    if hand.clamp is not None:
+        return hand.clamp.gauge(heading, tour)
     apart = np.subtract(hand.places[-1], hand.places[0])
     terms = tip(hand.tip).gauge(outward(hand, heading), np.array(hand.radius), apart)
     return terms / hand.covered[tour]

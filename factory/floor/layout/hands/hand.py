@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from factory.floor.layout.dimensions import FINGER
+from factory.floor.layout.hands.clamp import Clamp
 from factory.floor.layout.hands.tips import TipName
 from factory.support.arrays import Array
 
@@ -32,9 +33,6 @@ STEM = 0.006
 
 ROOT = 0.01
 """How far a finger begins before the end of its arm [m]."""
-
-BEAM = 0.012
-"""How high a beam is [m]."""
 
 PAD = 0.0015
 """Thickness of a pad [m]."""
@@ -55,6 +53,7 @@ class Hand:
         first: whether it is in place before its payload comes.
         wait: predicted distance that it goes back until its carrier's next operation may start [m].
         covered: share of a tip's face that the surface covers, for each tour, with suction.
+        clamp: the jaws that close over its tip; None without.
     """
 
     kind: Kind
@@ -66,6 +65,12 @@ class Hand:
     first: bool = False
     wait: float = 0.0
     covered: tuple[float, ...] = (1.0,)
+    clamp: Clamp | None = None
+
+    @property
+    def half(self) -> float:
+        """How far it reaches to the sides of its places [m]."""
+        return max(FINGER / 2, self.radius) if self.clamp is None else self.clamp.half
 
     @property
     def tall(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from factory.floor.layout.dimensions import SLOT
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
+from factory.floor.layout.hands.clamping import Clamping
 from factory.floor.layout.hands.hand import Hand, Kind
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.lowered import Lowered
@@ -70,7 +71,7 @@ class InTheWay:
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
-        self.lowered = Lowered(holding, self.apart)
+        self.lowered, self.clamping = Lowered(holding, self.apart), Clamping(holding)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
         self._passed: dict[tuple[object, ...], Passed] = {}
         self._onward: dict[int, Array] = {}
@@ -86,15 +87,17 @@ class InTheWay:
         return all(bool(side.any()) for side in sides)
 
     def on_side(
-        self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]], radius: float = 0.0
+        self, robot: int, kind: Kind, frames: Sequence[tuple[Way, Way]], radius: float = 0.0
     ) -> Places:
-        """The places on the side of a sub-assembly that a kind of hand holds, with the best pad at
-        each or, if it fits, with one of a `radius` [m]."""
+        """The places on the side of what a robot takes that a kind of hand holds, with the best pad
+        at each or, if it fits, with one of a `radius` [m]."""
         axis, way = (2, -1 if kind == "below" else 1)
+        u, _ = frames[0]
         if kind == "behind":
-            u, _ = frames[0]
             axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
-        return self.holding.places(label, kind, axis, way, radius)
+        label = held(self.holding.factory, robot)
+        places = self.holding.places(label, kind, axis, way, radius)
+        return self.clamping.places(robot, kind, places, u)
 
     def checks(
         self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
@@ -103,7 +106,12 @@ class InTheWay:
         whether it has to be there before its payload. Cached."""
         key = robot, kind, tuple(frames), _digest(places)
         if key not in self._checked:
-            self._checked[key] = self._looked_at(robot, label, kind, places, frames)
+            free, first = self._looked_at(robot, label, kind, places, frames)
+            for column in self.clamping.columns(robot, kind, places, frames[0][0]):
+                beside, before = self._looked_at(robot, label, kind, column, frames)
+                free = {why: clear & beside[why] for why, clear in free.items()}
+                first = first | before
+            self._checked[key] = free, first
         return self._checked[key]
 
     def waits(
@@ -112,9 +120,10 @@ class InTheWay:
         """Distance that a hand at each place (n,) goes back, in any frame, until its carrier's next
         operation may start [m]."""
         waits = np.zeros(len(places))
-        for u, t in frames if len(places) else ():
-            going = self._going_on(robot, kind, places, u, t)
-            waits = np.maximum.reduce([waits, going, self.apart.crossing(robot, places, u, t)])
+        for at in (places, *self.clamping.columns(robot, kind, places, frames[0][0])):
+            for u, t in frames if len(places) else ():
+                going = self._going_on(robot, kind, at, u, t)
+                waits = np.maximum.reduce([waits, going, self.apart.crossing(robot, at, u, t)])
         return waits
 
     def _looked_at(
@@ -134,7 +143,7 @@ class InTheWay:
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
-            free["feeder"] &= self._beside_rod(label, places, *frames[0])
+            free["feeder"] &= self._beside_rod(robot, label, places, *frames[0])
         if self.holding.factory.drops(self.holding.last(robot).index):
             free["tray"] &= (
                 self._beside_slot(places, frames[0][0])
@@ -200,14 +209,15 @@ class InTheWay:
             (high if ahead > 0 else low)[:, axis] += ahead * ROOM
         return low, high
 
-    def _beside_rod(self, label: str, places: Places, u: Way, t: Way) -> Truth:
+    def _beside_rod(self, robot: int, label: str, places: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for its feeder's rod: behind a hand above it, or on the side away
-        from its tower, which stands against t."""
+        from its tower, which stands against t; jaws are on both sides."""
         solid, room = self.holding.product.solids[label], np.zeros(len(places), bool)
-        for (x, y), far in ((u, -1.0), (t, 1.0)):
+        length = self.clamping.length(robot)
+        for (x, y), far in ((u, -1.0), (t, 1.0))[: 1 if length else 2]:
             axis, way = (0, x) if x else (1, y)
             end = float((solid.high if way * far > 0 else solid.low)[axis])
-            left = abs(end - places.at[:, axis]) - halves(places.radius)
+            left = abs(end - places.at[:, axis]) - np.maximum(halves(places.radius), length)
             width = float((solid.high - solid.low)[:2].min())
             least = min(ROD, width / (8 if width <= SMALL else 4))
             room |= left >= least + BESIDE

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from factory.floor.layout.dimensions import FINGER
+from factory.floor.layout.dimensions import BEAM, FINGER
 from factory.floor.layout.hands.apart import HandsApart, Swept
-from factory.floor.layout.hands.hand import BEAM, Kind
+from factory.floor.layout.hands.hand import Kind
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back, reach, under_beam

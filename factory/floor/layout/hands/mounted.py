@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from factory.floor.layout.dimensions import FINGER, FINGER_LOW, FINGER_TOP
+from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_LOW, FINGER_TOP
 from factory.floor.layout.guidepath import Extent, Point2
-from factory.floor.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
+from factory.floor.layout.hands.clamp import PALM
+from factory.floor.layout.hands.hand import AIR, PAD, ROOT, Hand, Point3
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
 Round = Literal["", "x", "z"]
@@ -104,6 +105,7 @@ def _below(mount: Mount, hand: Hand) -> Iterator[Limb]:
         yield from _rod(f"{which}column", x, y, half, FINGER_TOP, top - PAD, lifted)
         low = max(top - PAD, FINGER_TOP)
         yield from _rod(f"{which}pad", x, y, hand.radius, low, top, lifted)
+    yield from _clamp(mount, hand)
 
 
 def _behind(mount: Mount, hand: Hand) -> Iterator[Limb]:
@@ -133,6 +135,17 @@ def _above(mount: Mount, hand: Hand) -> Iterator[Limb]:
     foot = z + AIR
     yield from _rod("stem", x, y, hand.column / 2, foot + PAD, beam, lifted)
     yield from _rod("pad", x, y, hand.radius, foot, foot + PAD, lifted)
+    yield from _clamp(mount, hand)
+
+
+def _clamp(mount: Mount, hand: Hand) -> Iterator[Limb]:
+    """The palm and the jaws, each with all its way."""
+    if hand.clamp is None:
+        return
+    for name, ends in hand.clamp.boxes(mount.reached(hand)[0], hand.beam + mount.up):
+        (a, b, c), (d, e, f) = ((round(v, 6) for v in end) for end in ends)
+        called = name if name.startswith(PALM) else f"{name}/jaw"
+        yield Limb(called, (a, b, c), (d, e, f), "", mount.lifted)
 
 
 def _rod(

@@ -99,7 +99,7 @@ class _Search:
         """The nearest miss of a kind of hand, over all frames."""
         best: tuple[tuple[bool, int, float], Frames, Places] | None = None
         for frames in self.all_frames:
-            places = self.in_the_way.on_side(self.label, kind, frames)
+            places = self.in_the_way.on_side(self.robot, kind, frames)
             if not len(places):
                 continue
             number = self._counted(kind, places, frames)
@@ -117,7 +117,7 @@ class _Search:
         return Miss(
             kind,
             frames[0][0],
-            self.in_the_way.on_side(self.label, kind, frames).at,
+            self.in_the_way.on_side(self.robot, kind, frames).at,
             (round(x, 6), round(y, 6), round(z, 6)),
             float(place.radius[0]),
             float(place.pinned[0]),
@@ -128,7 +128,7 @@ class _Search:
 
     def _why(self, kind: Kind, frames: Frames) -> str:
         """The most frequent obstacle, in words."""
-        places = self.in_the_way.on_side(self.label, kind, frames)
+        places = self.in_the_way.on_side(self.robot, kind, frames)
         checks, _ = self.in_the_way.checks(self.robot, self.label, kind, places, frames)
         why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
         return f"{len(places) - int(free.sum())} of {len(places)} places: {IN_THE_WAY[why]}"

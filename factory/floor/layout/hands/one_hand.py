@@ -72,6 +72,8 @@ class OneHand:
 
     def _kinds(self, tour: int) -> tuple[Kind, ...]:
         holding = self.in_the_way.holding
+        if self._jaws(tour):
+            return ("above", "below") if holding.factory.lowers(tour) else ("below", "above")
         if holding.is_fed(tour) and holding.is_carrier(tour):
             return "below", "behind"  # the tower of a hand above stands beside a feeder's part
         last = holding.last(tour)
@@ -115,7 +117,7 @@ class OneHand:
         if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
             return ()
         groups = self._groups(hand.kind, tour, frames, 0.0)
-        if hand.kind == "below":
+        if hand.kind == "below" and not self._jaws(tour):
             groups = self._paired(tour, groups)
         at = groups.places.at[groups.chosen]
         ends = np.array((hand.places[0], hand.places[-1]))
@@ -163,7 +165,7 @@ class OneHand:
         options = list[Groups]()
         for tour in tours:
             groups = self._groups(kind, tour, frames, radius)
-            if kind == "below" and not radius and not groups.easy:
+            if kind == "below" and not (radius or groups.easy or self._jaws(tour)):
                 groups = self._paired(tour, groups)
             options.append(groups)
             if not len(groups):
@@ -172,7 +174,7 @@ class OneHand:
 
     def _radii(self, kind: Kind, tours: Sequence[int], frames: Frames) -> list[float]:
         """Possible radii of a tip for several tours, largest first [m]."""
-        places = [self.in_the_way.on_side(self._label(tour), kind, frames) for tour in tours]
+        places = [self.in_the_way.on_side(tour, kind, frames) for tour in tours]
         most = min(float(of_tour.radius.max(initial=0.0)) for of_tour in places)
         return sorted({r for p in places for r in p.radius.tolist() if r <= most})[::-1]
 
@@ -204,6 +206,10 @@ class OneHand:
         guests = [r for r, x in zip(last.robots, last.before, strict=True) if x != NOPART]
         return len(guests) > 1 and last.carrier not in guests
 
+    def _jaws(self, tour: int) -> bool:
+        """Whether the robot of a tour has jaws, which close over one pad."""
+        return bool(self.in_the_way.clamping.jaws(tour))
+
     def _label(self, tour: int) -> str:
         return held(self.in_the_way.holding.factory, tour)
 
@@ -214,7 +220,7 @@ class OneHand:
         tour; whether each (n,) is clear in every frame, and whether the hand must be there
         first."""
         label = self._label(tour)
-        places = self.in_the_way.on_side(label, kind, frames, radius)
+        places = self.in_the_way.on_side(tour, kind, frames, radius)
         checks, first = self.in_the_way.checks(tour, label, kind, places, frames)
         return places, np.logical_and.reduce([*checks.values(), np.ones(len(places), bool)]), first
 
@@ -300,6 +306,7 @@ class OneHand:
             any(bool(one.first[0]) for one in chosen),
             wait,
             tuple(float(one.covered[0]) if by == "suction" else 1.0 for one in chosen),
+            self.in_the_way.clamping.clamp(tours, kind, [p[0] for p in points], frames[0][0]),
         )
         both = zip(points, beams, strict=True)
         return tuple(replace(hand, places=places, beam=beam) for places, beam in both)

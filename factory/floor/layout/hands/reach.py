@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from factory.floor.geometry.solids import Product
-from factory.floor.layout.dimensions import FINGER
-from factory.floor.layout.hands.hand import AIR, BEAM, Kind, widths
+from factory.floor.layout.dimensions import BEAM, FINGER
+from factory.floor.layout.hands.hand import AIR, Kind, widths
 from factory.floor.layout.hands.surfaces import Way
 from factory.support.arrays import Array
 
