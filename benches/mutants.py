@@ -45,8 +45,8 @@ def changes(source: str) -> dict[int, list[Change]]:
     lines, found = [line.encode() for line in source.splitlines()], dict[int, list[Change]]()
     for row, start, end, text in spots(ast.parse(source), lines):
         line = lines[row - 1]
-        before, after = line, line[:start] + text.encode() + line[end:]
-        change = (row, before.decode().strip(), after.decode().strip())
+        after = line[:start] + text.encode() + line[end:]
+        change = (row, line.decode().strip(), after.decode().strip())
         found.setdefault(row, []).append(change)
     return found
 
@@ -59,21 +59,22 @@ ASIDE = ("annotation", "returns", "decorator_list")
 
 
 def spots(node: Any, lines: list[bytes]) -> Iterator[Spot]:
-    """The places in a node where a decision can be changed."""
+    """The places in a node where a decision can be changed; what texts show is none."""
+    if isinstance(node, ast.JoinedStr):
+        return
     for name, value in ast.iter_fields(node):
         for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST) and not (name in ASIDE or isinstance(child, ast.JoinedStr)):
+            if isinstance(child, ast.AST) and name not in ASIDE:
                 yield from spots(child, lines)
     row = getattr(node, "lineno", 0)
     if row and row == node.end_lineno:
         yield from ((row, *one) for one in replacements(node, lines[row - 1]))
-    if (
-        isinstance(node, ast.If | ast.IfExp | ast.While)
-        and node.test.lineno == node.test.end_lineno
-    ):
-        start, end = node.test.col_offset, node.test.end_col_offset or 0
-        said = lines[node.test.lineno - 1][start:end].decode()
-        yield node.test.lineno, start, end, f"(not ({said}))"
+    if isinstance(node, ast.If | ast.IfExp | ast.While):
+        test = node.test
+        if test.lineno == test.end_lineno:
+            start, end = test.col_offset, test.end_col_offset or 0
+            said = lines[test.lineno - 1][start:end].decode()
+            yield test.lineno, start, end, f"(not ({said}))"
 
 
 def replacements(node: ast.AST, line: bytes) -> Iterator[tuple[int, int, str]]:
@@ -147,7 +148,7 @@ def failing(copy: Path, tests: Sequence[str], limit: float, every: bool) -> list
         done = subprocess.run(words, cwd=copy, env=os.environ | {"PYTHONPATH": ""}, **options)
     except subprocess.TimeoutExpired:
         return ["no end"]
-    names = re.findall(r"^(?:FAILED|ERROR) (\S+)", done.stdout, re.M)
+    names = re.findall(r"^(?:FAILED|ERROR) (.*?)(?: - .*)?$", done.stdout, re.M)
     return names or ([] if done.returncode == 0 else [f"status {done.returncode}"])
 
 
