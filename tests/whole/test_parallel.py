@@ -442,10 +442,13 @@ def test_a_branch_that_gains_nothing_is_named(run: Terminal, file: Path) -> None
     assert "would do" not in run("analyze", file, "--parallel", "sub2=2").out
 
 
-def test_a_unit_waits_for_none_that_comes_after_it() -> None:
+@pytest.mark.parametrize(
+    ("name", "label"), [("paper", "sub2"), pytest.param("truck", "log2", marks=pytest.mark.slow)]
+)
+def test_a_unit_waits_for_none_that_comes_after_it(name: str, label: str) -> None:
     """Units are made one after the other in the order by which machines are kept apart: the last
     unit that is asked for does not wait for a part of a unit that nobody asks for."""
-    layout = with_branches(read("examples/truck.pag"), [("log2", 2)]).layout
+    layout = with_branches(read(f"examples/{name}.pag"), [(label, 2)]).layout
     turns = [layout.factory.operations[number].turn for number in layout.factory.order]
     assert turns == sorted(turns)
-    assert watched(Simulation(layout, RunRequest(units=1)), max_time=120.0).succeeded
+    assert watched(Simulation(layout, RunRequest("ideal", units=1)), max_time=120.0).succeeded
