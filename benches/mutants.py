@@ -3,7 +3,7 @@
 `python -m benches.mutants draw --seed S --count N [ROOM…]` draws changes by lines and adds them to
 the list, `benches/mutants.toml`. `python -m benches.mutants run [ROOM…] --tests PATH…` applies each
 change of the rooms to a copy of the project, runs the tests there, and prints which test failed
-first (`--all`: every test that fails); `--write NAME` keeps that in the list, in the column NAME.
+first (`--all`: every test that fails); `--write then` and `--write now` keep that in the list.
 A room is a folder, as in `factory/floor/mating`, or a file. Without `--tests` the tests are those
 that the list names for the room."""
 
@@ -27,6 +27,9 @@ from typing import Any
 ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "benches" / "mutants.toml"
 FOLDERS = ("benches", "docs", "examples", "factory", "mjcf", "templates", "tests", "tools")
+
+COLUMNS = ("then", "now")
+"""What the list keeps of runs: which test failed first, "" if none did."""
 
 Mutant = dict[str, Any]
 Change = tuple[int, str, str]
@@ -163,7 +166,8 @@ def run(kept: dict[str, Any], asked: argparse.Namespace) -> None:
         for path in (*ROOT.glob("*.toml"), *ROOT.glob("*.md"), ROOT / "Makefile"):
             shutil.copy(path, copy)
         for one in wanted:
-            path, source = copy / one["file"], (ROOT / one["file"]).read_text(encoding="utf-8")
+            path = copy / one["file"]
+            source = path.read_text(encoding="utf-8")
             room = max((room for room in kept["tests"] if within(one["file"], [room])), key=len)
             tests, text = asked.tests or kept["tests"][room], mutated(source, one)
             names = ["gone"]
@@ -212,7 +216,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--tests", nargs="+", metavar="PATH")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds for each mutant")
     parser.add_argument("--all", action="store_true", help="print every test that fails")
-    parser.add_argument("--write", metavar="NAME", help="keep what was found in this column")
+    parser.add_argument("--write", choices=COLUMNS, help="keep what was found in the list")
     asked = parser.parse_args(words)
     kept = tomllib.loads(LIST.read_text(encoding="utf-8")) if LIST.exists() else {}
     kept.setdefault("tests", {}), kept.setdefault("mutant", [])
