@@ -28,7 +28,7 @@ from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, 
 from factory.floor.mating.mating import matings
 from factory.floor.mating.meetings import meetings
 from factory.floor.mating.overlaps import CHUNK
-from factory.floor.mating.paths import CLEAR, NEAR, TOLERANCE, depths_of, sought
+from factory.floor.mating.paths import CLEAR, LAST, NEAR, TOLERANCE, depths_of, sought
 from factory.pipeline import all_templates
 from factory.support.errors import Diagnostic
 from factory.theory.compiler.expanding import expand
@@ -388,6 +388,39 @@ def test_depths_are_those_of_the_hull_of_all_differences() -> None:
         assert max(depth[0], 0) == pytest.approx(max(at_shift, 0), abs=1e-8)
         assert (depth[0] > 0) == (max(expected.max(), at_shift) > 0)
         assert deepest(rough(mine, theirs), here, direction)[0][0] >= depth[0] - 1e-9
+
+
+def test_blades_over_a_box_meet_its_edges_on_the_right_side() -> None:
+    """The faces beside the edge of a blade say nearly nothing of where outside is."""
+    box, along = block((-20, 20), (-20, 20), (-20, 20)), np.array([-0.03, 0.03])
+    blade = np.array([(x, y, z) for x in along for y, z in ((0, 0), (5e-4, 0.02), (-5e-4, 0.02))])
+    met = 0
+    for seed in range(24):
+        rng = np.random.default_rng(seed)
+        turned = blade @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + rng.normal(size=3) * 0.02
+        depth = exact(polytope(box), polytope(turned)).heights(np.zeros((1, 3))).min()
+        expected = brute(box, turned, np.eye(3)[0], np.zeros(1))[0]
+        assert max(depth, 0) == pytest.approx(max(expected, 0), abs=1e-8), seed
+        assert (depth > 0) == (expected > 0)
+        met += depth > 0
+    assert 5 < met < 24
+
+
+def test_what_grazes_is_met_beyond_the_last_bit_of_the_way() -> None:
+    for seed in range(12):
+        p, q = convex_pair(seed)
+        difference = exact(polytope(p), polytope(q))
+        for axis, direction in enumerate(np.eye(3)):
+            heights, slopes = difference.heights(np.zeros((1, 3))), difference.normals[:, axis]
+            depths, places = depths_of(heights, slopes)
+            for side, sign in enumerate((-1, 1)):
+                graze, place = depths.graze[0, side], places[2 + side]
+                assert sign * place[0] >= LAST
+                assert max(graze, 0) == pytest.approx(
+                    max(brute(p, q, direction, place)[0], 0), abs=1e-8
+                )
+                beyond = sign * np.linspace(LAST, 0.4, 400)
+                assert max(graze, 0) >= brute(p, q, direction, beyond).max() - 1e-8
 
 
 def test_one_difference_serves_bodies_wherever_they_are() -> None:
