@@ -26,14 +26,21 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 LIST = ROOT / "benches" / "mutants.toml"
-FOLDERS = ("benches", "docs", "examples", "factory", "mjcf", "templates", "tests", "tools")
+LEFT = (".*", "__pycache__", "_build", "build", "dist", "renders")
+"""What no test needs a copy of."""
 
 COLUMNS = ("then", "now")
 """What the list keeps of runs: which test failed first, "" if none did."""
 
+ASIDE = ("annotation", "returns", "decorator_list")
+"""Fields of nodes in which nothing is decided."""
+
 Mutant = dict[str, Any]
 Change = tuple[int, str, str]
 """The number of a line, the line, and what it becomes, both without indentation."""
+
+Spot = tuple[int, int, int, str]
+"""A line, the bytes of it from here to there, and what replaces them."""
 
 COMPARED = {
     **{ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "=="},
@@ -52,13 +59,6 @@ def changes(source: str) -> dict[int, list[Change]]:
         change = (row, line.decode().strip(), after.decode().strip())
         found.setdefault(row, []).append(change)
     return found
-
-
-Spot = tuple[int, int, int, str]
-"""A line, the bytes of it from here to there, and what replaces them."""
-
-ASIDE = ("annotation", "returns", "decorator_list")
-"""Fields of nodes in which nothing is decided."""
 
 
 def spots(node: Any, lines: list[bytes]) -> Iterator[Spot]:
@@ -107,12 +107,6 @@ def replacements(node: ast.AST, line: bytes) -> Iterator[tuple[int, int, str]]:
             yield node.col_offset, node.end_col_offset or 0, "pass"
 
 
-def sources(rooms: Sequence[str]) -> list[str]:
-    """The files of rooms, of all if none is said."""
-    files = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("factory/**/*.py"))
-    return [file for file in files if not rooms or within(file, rooms)]
-
-
 def within(file: str, rooms: Sequence[str]) -> bool:
     return any(file == room or file.startswith(room.rstrip("/") + "/") for room in rooms)
 
@@ -120,7 +114,9 @@ def within(file: str, rooms: Sequence[str]) -> bool:
 def drawn(rooms: Sequence[str], seed: int, count: int) -> list[Mutant]:
     """Mutants of so many lines: each line that decides something is as likely as another."""
     rng, every = random.Random(seed), list[tuple[str, list[Change]]]()
-    for file in sources(rooms):
+    for file in sorted(path.relative_to(ROOT).as_posix() for path in ROOT.glob("factory/**/*.py")):
+        if rooms and not within(file, rooms):
+            continue
         by_line = changes((ROOT / file).read_text(encoding="utf-8"))
         every += [(file, by_line[row]) for row in sorted(by_line)]
     found = list[Mutant]()
@@ -160,25 +156,18 @@ def run(kept: dict[str, Any], asked: argparse.Namespace) -> None:
     wanted = [one for one in kept["mutant"] if not asked.rooms or within(one["file"], asked.rooms)]
     killed = 0
     with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder)
-        for name in FOLDERS:
-            shutil.copytree(ROOT / name, copy / name, ignore=shutil.ignore_patterns("__pycache__"))
-        for path in (*ROOT.glob("*.toml"), *ROOT.glob("*.md"), ROOT / "Makefile"):
-            shutil.copy(path, copy)
+        copy = shutil.copytree(ROOT, Path(folder) / "copy", ignore=shutil.ignore_patterns(*LEFT))
         for one in wanted:
-            path = copy / one["file"]
+            path, names = copy / one["file"], ["gone"]
             source = path.read_text(encoding="utf-8")
             room = max((room for room in kept["tests"] if within(one["file"], [room])), key=len)
-            tests, text = asked.tests or kept["tests"][room], mutated(source, one)
-            names = ["gone"]
-            if text is not None:
+            if (text := mutated(source, one)) is not None:
                 path.write_text(text, encoding="utf-8")
-                names = failing(copy, tests, asked.limit, asked.all)
+                names = failing(copy, asked.tests or kept["tests"][room], asked.limit, asked.all)
                 path.write_text(source, encoding="utf-8")
-            killed += bool(names)
-            print(
-                f"{one['file']}:{one['line']} {one['after']}\n    {names or 'survives'}", flush=True
-            )
+            killed += names not in ([], ["gone"])
+            told = f"{one['file']}:{one['line']} {one['after']}\n    {names or 'survives'}"
+            print(told, flush=True)
             if asked.write:
                 one[asked.write] = names[0] if names else ""
                 LIST.write_text(written(kept), encoding="utf-8")
@@ -188,23 +177,13 @@ def run(kept: dict[str, Any], asked: argparse.Namespace) -> None:
 def written(kept: dict[str, Any]) -> str:
     """The list as a file."""
     tables = [("[tests]", kept["tests"]), *(("[[mutant]]", one) for one in kept["mutant"])]
-    return "\n".join(
-        "\n".join(
-            [
-                head,
-                *(
-                    f"{_key(key)} = {json.dumps(value, ensure_ascii=False)}"
-                    for key, value in table.items()
-                ),
-                "",
-            ]
-        )
-        for head, table in tables
-    )
+    return "\n".join(head + "\n" + "".join(map(_row, table.items())) for head, table in tables)
 
 
-def _key(key: str) -> str:
-    return key if key.isidentifier() else json.dumps(key)
+def _row(entry: tuple[str, Any]) -> str:
+    key, value = entry
+    name = key if key.isidentifier() else json.dumps(key)
+    return f"{name} = {json.dumps(value, ensure_ascii=False)}\n"
 
 
 def main(words: Sequence[str] | None = None) -> None:
