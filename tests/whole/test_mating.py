@@ -25,6 +25,7 @@ from factory.floor.geometry.solids import Product
 from factory.floor.mating import bodies, paths
 from factory.floor.mating.depth import Difference, exact, polytope, rough, summits
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
+from factory.floor.mating.mating import judged as without_lifts
 from factory.floor.mating.mating import matings
 from factory.floor.mating.meetings import meetings
 from factory.floor.mating.overlaps import CHUNK
@@ -36,6 +37,7 @@ from factory.theory.lang import read_pag
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
+from tests.pag_values import factory_of
 from tests.strategies import pags, random_pag_text
 from tests.work import counted
 
@@ -184,11 +186,19 @@ def test_a_peg_goes_into_its_hole_along_its_axis_alone(axis: int, text: str, kin
 
 def test_a_box_in_a_frame_is_lowered_and_under_a_lid_is_blocked() -> None:
     frame, inner = plate(8, 2), block((-8, 8), (-8, 8), (-4, 4))
-    assert one(judged(ALONG_Y, a=frame, b=[inner])).approach.kind == "lower"
+    into = one(judged(ALONG_Y, a=frame, b=[inner])).approach
+    assert (into.kind, into.stroke) == ("lower", pytest.approx(0.029))
     lids = [block((-30, 30), (-30, 30), z) for z in ((-7, -5), (5, 7))]
     closed = one(judged(ALONG_Y, a=frame + lids, b=[inner]))
     assert closed.approach.kind == "blocked"
     assert closed.clashes[0].parts == ("a", "b")
+
+
+def test_robots_without_lifts_lower_nothing() -> None:
+    pag, product = made_of(ALONG_Y, a=plate(8, 2), b=[block((-8, 8), (-8, 8), (-4, 4))])
+    factory = without_lifts(factory_of(pag), product)
+    (approach,) = (o.approach for o in factory.operations if len(o.inputs) > 1)
+    assert approach is not None and approach.kind == "blocked"
 
 
 def test_with_a_floor_the_box_is_still_lowered_or_the_frame_is_put_over_it() -> None:
