@@ -73,7 +73,7 @@ def test_looking_at_every_pair_finds_the_same(drawn: Drawn) -> None:
     for changed in (layout, shortened(layout, 0, 0.03), with_path(layout, 0, arm=-0.3)):
         every = [*presences(changed, with_machines(changed, ()), {})]
         sizes = np.array([len(one.boxes) for one in every])
-        if sizes.sum() > 1500:
+        if sizes.sum() > 700:
             continue
         pairs = {frozenset([id(p.one), id(p.other)]) for p in near(every, changed.clearance)}
         assert pairs == {*every_pair(every, changed.clearance)}
@@ -211,19 +211,18 @@ def test_a_larger_payload_than_the_layout_knew() -> None:
 def test_a_post_in_the_way() -> None:
     """A layout that takes a part for longer puts its post farther back, some day where another
     is."""
-    layout = random_layout(30, 2, "balanced", "medium")
+    layout, far = random_layout(15, 2, "balanced", "medium"), 0.6
     found = set()
     for leaf in layout.factory.leaves:
         xlo, xhi, ylo, yhi = layout.payloads[leaf.label]
-        for far in (0.1, 0.3, 0.6):
-            longer = (xlo - far, xhi + far, ylo - far, yhi + far)
-            payloads = {**layout.payloads, leaf.label: longer}
-            for fault in certify(replace(layout, payloads=payloads, certificate=None)).faults:
-                name = layout.factory.robots[leaf.carrier].name
-                if f"post of feeder of {name}," in fault.message:
-                    found.add(leaf.label)
-                    assert name in fault.robots
-    assert len(found) >= 5
+        longer = (xlo - far, xhi + far, ylo - far, yhi + far)
+        payloads = {**layout.payloads, leaf.label: longer}
+        for fault in certify(replace(layout, payloads=payloads, certificate=None)).faults:
+            name = layout.factory.robots[leaf.carrier].name
+            if f"post of feeder of {name}," in fault.message:
+                found.add(leaf.label)
+                assert name in fault.robots
+    assert len(found) >= 3
 
 
 def test_the_outfeed_in_the_way() -> None:
@@ -286,7 +285,7 @@ def test_most_guidepaths_cannot_be_5_mm_shorter() -> None:
 
 def test_work_grows_with_the_number_of_robots() -> None:
     for shape in SHAPES:
-        small, large = (random_layout(n, 1, shape, "plain") for n in (40, 120))
+        small, large = (random_layout(n, 1, shape, "plain") for n in (10, 30))
         robots = len(large.guidepaths) / len(small.guidepaths)
         many, few = ([*presences(one, with_machines(one, ()), {})] for one in (large, small))
         assert len(many) <= 1.3 * robots * len(few)

@@ -19,7 +19,7 @@ from pathlib import Path
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film import Film
+from factory.film import Film, Picture
 from factory.pipeline import read
 from factory.theory.nets.verify import verify
 
@@ -28,8 +28,8 @@ assert verify(project.factory.net).live
 assert project.layout.certificate.holds
 assert "<mujoco" in physical_model(project.layout, units=2).xml
 assert Simulation(project.layout, RunRequest("ideal", units=2)).run().succeeded
-made = Simulation(project.layout, RunRequest("mujoco", units=2))
-with Film(made, Path("film.mp4")) as film:
+made = Simulation(project.layout, RunRequest("mujoco", units=1))
+with Film(made, Path("film.mp4"), Picture((320, 180))) as film:
     assert made.run([film.observe]).succeeded
 assert film.frames > 100
 there = [name for name in sys.modules if name.startswith(("factory.apps", "factory.commands"))]
@@ -49,4 +49,4 @@ def test_the_core_runs_without_apps(tmp_path: Path) -> None:
     words = [sys.executable, "-c", WITHOUT_APPS, str(ROOT / "examples" / "paper.pag")]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "film.mp4").stat().st_size > 100_000
+    assert (tmp_path / "film.mp4").stat().st_size > 30_000

@@ -324,7 +324,7 @@ def tried(read: Callable[[Path, Random], None], folder: Path, seeds: range) -> i
     return read_well
 
 
-SLOW_READERS = {"step": 16, "plan": 2}
+SLOW_READERS = {"step": 40, "plan": 2}
 """How many times fewer files of these kinds are tried."""
 
 

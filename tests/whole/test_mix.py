@@ -111,26 +111,29 @@ def family(seed: int) -> PAG | None:
     return random_family(seed)
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_random_families_are_certified_and_explored(seed: int) -> None:
+def test_random_families_are_certified_and_explored() -> None:
     """Theorem 9: live, safe and reversible, by the proof, by the other program, and by looking at
     every marking; any other order of a line's tours is dead. The output robot's own order may be
     another where no other robot serves both products."""
-    pag = family(seed)
-    if pag is None:
-        return
-    factory = mixed_factory(pag)
-    verdict = verify(factory.net)
-    assert verdict.holds and verdict.gear_train
-    assert pag.mix is not None and factory.sequence == pag.mix.sequence
-    assert check_certificate(json.loads(json.dumps(certificate(factory.net, verdict)))) == []
-    if len(factory.operations) < 18:
-        truth = explored(marked(factory.net), 60_000)
-        assert truth is None or truth.behaviour == (True, True, True)
-    for robot, one, other in pairs_of_tours(factory):
-        found = verify(swapped(factory, robot, one, other))
-        assert not (found.live and robot), "another order of a line's tours is live"
-        assert found.live or found.faults
+    made = 0
+    for seed in range(16):
+        pag = family(seed)
+        if pag is None:
+            continue
+        made += 1
+        factory = mixed_factory(pag)
+        verdict = verify(factory.net)
+        assert verdict.holds and verdict.gear_train
+        assert pag.mix is not None and factory.sequence == pag.mix.sequence
+        assert check_certificate(json.loads(json.dumps(certificate(factory.net, verdict)))) == []
+        if len(factory.operations) < 18:
+            truth = explored(marked(factory.net), 60_000)
+            assert truth is None or truth.behaviour == (True, True, True)
+        for robot, one, other in pairs_of_tours(factory):
+            found = verify(swapped(factory, robot, one, other))
+            assert not (found.live and robot), "another order of a line's tours is live"
+            assert found.live or found.faults
+    assert made >= 8
 
 
 def test_products_share_robots() -> None:
@@ -186,16 +189,19 @@ def test_products_that_begin_otherwise_are_refused(trees: tuple[Tree, Tree], mes
     assert [(d.code, d.message) for d in caught.value.diagnostics] == [("BadLine", message)]
 
 
-@pytest.mark.parametrize("seed", range(0, 40, 4))
-def test_the_cycle_time_is_that_of_the_token_game(seed: int) -> None:
-    pag = family(seed)
-    if pag is None:
-        return
-    factory, rng = mixed_factory(pag), random.Random(seed)
-    seconds = [rng.uniform(0.3, 2.0) for _ in factory.operations]
-    places = len(factory.net.threaded.places)
-    game = simulated_cycle(factory.net, [*seconds, *[0.0] * (places - len(seconds))])
-    assert game / factory.period == pytest.approx(cycle_time(factory, seconds).seconds)
+def test_the_cycle_time_is_that_of_the_token_game() -> None:
+    made = 0
+    for seed in range(0, 40, 4):
+        pag = family(seed)
+        if pag is None:
+            continue
+        made += 1
+        factory, rng = mixed_factory(pag), random.Random(seed)
+        seconds = [rng.uniform(0.3, 2.0) for _ in factory.operations]
+        places = len(factory.net.threaded.places)
+        game = simulated_cycle(factory.net, [*seconds, *[0.0] * (places - len(seconds))])
+        assert game / factory.period == pytest.approx(cycle_time(factory, seconds).seconds)
+    assert made >= 5
 
 
 def test_the_even_sequence_is_even() -> None:

@@ -16,21 +16,21 @@ from tests.arm_models import PACE, both, configurations, random_way, shipped
 SEEDS = range(30)
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_frames_and_jacobians_are_those_of_the_engine(seed: int) -> None:
-    chain, m, d = both(seed)
-    q = configurations(chain, 5, seed)
-    place, turn, columns = chain.tool_and_jacobian(q)
-    rows = np.zeros((6, len(chain)))
-    for number in range(len(q)):
-        d.qpos[:] = q[number]
-        mujoco.mj_forward(m, d)
-        mujoco.mj_jacSite(m, d, rows[:3], rows[3:], 0)
-        home, stand = base_of(m, d)
-        assert np.abs(home.T @ (d.site_xpos[0] - stand) - place[number]).max() < 1e-12
-        assert np.abs(home.T @ d.site_xmat[0].reshape(3, 3) - turn[number]).max() < 1e-12
-        there = np.vstack([home.T @ rows[:3], home.T @ rows[3:]])
-        assert np.abs(there - columns[number]).max() < 1e-12
+def test_frames_and_jacobians_are_those_of_the_engine() -> None:
+    for seed in range(8):
+        chain, m, d = both(seed)
+        q = configurations(chain, 5, seed)
+        place, turn, columns = chain.tool_and_jacobian(q)
+        rows = np.zeros((6, len(chain)))
+        for number in range(len(q)):
+            d.qpos[:] = q[number]
+            mujoco.mj_forward(m, d)
+            mujoco.mj_jacSite(m, d, rows[:3], rows[3:], 0)
+            home, stand = base_of(m, d)
+            assert np.abs(home.T @ (d.site_xpos[0] - stand) - place[number]).max() < 1e-12
+            assert np.abs(home.T @ d.site_xmat[0].reshape(3, 3) - turn[number]).max() < 1e-12
+            there = np.vstack([home.T @ rows[:3], home.T @ rows[3:]])
+            assert np.abs(there - columns[number]).max() < 1e-12
 
 
 def base_of(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
@@ -39,41 +39,41 @@ def base_of(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[np.ndarray, np.ndarray
     return d.xmat[base].reshape(3, 3), d.xpos[base]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_torques_are_those_of_the_engine(seed: int) -> None:
-    chain, m, d = both(seed)
-    rng = np.random.default_rng(seed)
-    q = configurations(chain, 4, seed)
-    first, second = rng.normal(size=(2, *q.shape))
-    mujoco.mj_forward(m, d)
-    home, _ = base_of(m, d)
-    alpha, beta, gamma = scalar_law(chain, q, first, second, home.T @ [0.0, 0.0, -9.81])
-    for number, (fast, push) in enumerate(rng.normal(size=(len(q), 2))):
-        d.qpos[:], d.qvel[:] = q[number], first[number] * fast
-        d.qacc[:] = first[number] * push + second[number] * fast**2
-        mujoco.mj_inverse(m, d)
-        law = alpha[number] * push + beta[number] * fast**2 + gamma[number]
-        assert np.abs(law - d.qfrc_inverse).max() < 1e-9
+def test_torques_are_those_of_the_engine() -> None:
+    for seed in range(8):
+        chain, m, d = both(seed)
+        rng = np.random.default_rng(seed)
+        q = configurations(chain, 4, seed)
+        first, second = rng.normal(size=(2, *q.shape))
+        mujoco.mj_forward(m, d)
+        home, _ = base_of(m, d)
+        alpha, beta, gamma = scalar_law(chain, q, first, second, home.T @ [0.0, 0.0, -9.81])
+        for number, (fast, push) in enumerate(rng.normal(size=(len(q), 2))):
+            d.qpos[:], d.qvel[:] = q[number], first[number] * fast
+            d.qacc[:] = first[number] * push + second[number] * fast**2
+            mujoco.mj_inverse(m, d)
+            law = alpha[number] * push + beta[number] * fast**2 + gamma[number]
+            assert np.abs(law - d.qfrc_inverse).max() < 1e-9
 
 
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_payload_is_a_body_at_the_tool(seed: int) -> None:
+def test_a_payload_is_a_body_at_the_tool() -> None:
     """The kinetic energy of the loaded chain is that of the chain and of the load."""
-    chain, _, _ = both(seed)
-    rng = np.random.default_rng(seed)
-    center, moment = rng.normal(size=3) * 0.1, np.diag([0.01, 0.02, 0.015])
-    loaded = chain.with_payload(2.0, center, moment)
-    q, speed = configurations(chain, 1, seed), rng.normal(size=(1, len(chain)))
-    _, turn, columns = chain.tool_and_jacobian(q)
-    velocity, spin = np.split(columns[0] @ speed[0], 2)
-    velocity = velocity + np.cross(spin, turn[0] @ center)
-    tensor = turn[0] @ moment @ turn[0].T
-    energy = 2.0 * velocity @ velocity + spin @ tensor @ spin
-    rest = np.zeros_like(speed)
-    more = torques(loaded, q, rest, speed) - torques(chain, q, rest, speed)
-    assert float((more * speed).sum()) == pytest.approx(energy, rel=1e-9)
-    weight = weights(loaded, q) - weights(chain, q)
-    assert float((weight * speed).sum()) == pytest.approx(2.0 * 9.81 * velocity[2], rel=1e-9)
+    for seed in range(8):
+        chain, _, _ = both(seed)
+        rng = np.random.default_rng(seed)
+        center, moment = rng.normal(size=3) * 0.1, np.diag([0.01, 0.02, 0.015])
+        loaded = chain.with_payload(2.0, center, moment)
+        q, speed = configurations(chain, 1, seed), rng.normal(size=(1, len(chain)))
+        _, turn, columns = chain.tool_and_jacobian(q)
+        velocity, spin = np.split(columns[0] @ speed[0], 2)
+        velocity = velocity + np.cross(spin, turn[0] @ center)
+        tensor = turn[0] @ moment @ turn[0].T
+        energy = 2.0 * velocity @ velocity + spin @ tensor @ spin
+        rest = np.zeros_like(speed)
+        more = torques(loaded, q, rest, speed) - torques(chain, q, rest, speed)
+        assert float((more * speed).sum()) == pytest.approx(energy, rel=1e-9)
+        weight = weights(loaded, q) - weights(chain, q)
+        assert float((weight * speed).sum()) == pytest.approx(2.0 * 9.81 * velocity[2], rel=1e-9)
 
 
 def test_no_point_is_faster_than_its_levers() -> None:

@@ -83,19 +83,19 @@ def test_seeds_fill_the_ranges() -> None:
             assert np.bincount((column * 10).astype(int), minlength=10).min() >= 10
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_random_chains_come_back_to_their_poses(seed: int) -> None:
+def test_random_chains_come_back_to_their_poses() -> None:
     """Of chains with at least 6 joints, from a configuration close by; what is not at the pose is
     not said to be."""
-    chain, _, _ = both(seed)
-    q = configurations(chain, 20, seed)
-    place, turn = chain.tool(q)
-    rng = np.random.default_rng(seed)
-    back, there = descend(chain, place, turn, q + rng.normal(size=q.shape) * 0.02)
-    at, now = chain.tool(back)
-    off = np.linalg.norm(at - place, axis=-1) + np.abs(now - turn).max(axis=(1, 2))
-    assert ((off < 1e-7) == there).all()
-    assert there.mean() >= 0.9
+    for seed in range(6):
+        chain, _, _ = both(seed)
+        q = configurations(chain, 20, seed)
+        place, turn = chain.tool(q)
+        rng = np.random.default_rng(seed)
+        back, there = descend(chain, place, turn, q + rng.normal(size=q.shape) * 0.02)
+        at, now = chain.tool(back)
+        off = np.linalg.norm(at - place, axis=-1) + np.abs(now - turn).max(axis=(1, 2))
+        assert ((off < 1e-7) == there).all()
+        assert there.mean() >= 0.9
 
 
 def test_hinges_turn_to_the_nearest_in_their_range() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from factory.apps.arms.chain import ConvexBody, SerialChain
 from factory.apps.arms.joint_way import JointWay
@@ -41,21 +40,22 @@ def test_travels_bound_the_paths_of_points() -> None:
     assert used > 0.5
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_nothing_is_nearer_than_the_lemma_says(seed: int) -> None:
+def test_nothing_is_nearer_than_the_lemma_says() -> None:
     """The distance of a tool from a point near its way, between samples of random chains with
     hinges and slides."""
-    chain, _, _ = both(seed)
-    rng = np.random.default_rng(seed)
-    knots = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, 9))])
-    way = JointWay(knots, configurations(chain, 10, seed) * rng.uniform(0.05, 1.0))
-    x = np.linspace(0.0, way.length, 251)
-    tool = tip(chain)
-    path = points_at(chain, tool, way.at(np.linspace(0.0, way.length, 250 * STEPS + 1))[0])[:, 0]
-    near = path[rng.integers(len(path))] + rng.normal(0.0, 1e-3, 3)
-    distance = np.linalg.norm(path - near, axis=-1)
-    least = np.lib.stride_tricks.sliding_window_view(distance, STEPS + 1)[::STEPS].min(axis=1)
-    at = distance[::STEPS]
-    bound = (at[:-1] + at[1:] - travels(chain, way, x, [tool])[:, 0]) / 2
-    assert (least >= bound - 1e-12).all()
-    assert (least < at[:-1]).any()
+    for seed in range(8):
+        chain, _, _ = both(seed)
+        rng = np.random.default_rng(seed)
+        knots = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, 9))])
+        way = JointWay(knots, configurations(chain, 10, seed) * rng.uniform(0.05, 1.0))
+        x = np.linspace(0.0, way.length, 251)
+        tool = tip(chain)
+        fine = np.linspace(0.0, way.length, 250 * STEPS + 1)
+        path = points_at(chain, tool, way.at(fine)[0])[:, 0]
+        near = path[rng.integers(len(path))] + rng.normal(0.0, 1e-3, 3)
+        distance = np.linalg.norm(path - near, axis=-1)
+        least = np.lib.stride_tricks.sliding_window_view(distance, STEPS + 1)[::STEPS].min(axis=1)
+        at = distance[::STEPS]
+        bound = (at[:-1] + at[1:] - travels(chain, way, x, [tool])[:, 0]) / 2
+        assert (least >= bound - 1e-12).all()
+        assert (least < at[:-1]).any()

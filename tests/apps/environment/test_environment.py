@@ -49,8 +49,8 @@ def test_it_passes_the_checker_of_gymnasium() -> None:
 
 @pytest.mark.parametrize("name", ["paper", "peg", "stool", "chest", "family"])
 def test_the_baseline_makes_all_units(name: str) -> None:
-    paid, refused, info = episode(env_of(name, units=3, jitter=0.3, interval=0.05), 5)
-    assert (paid, refused, info["products"], info["tripped"]) == (3.0, [], 3, False)
+    paid, refused, info = episode(env_of(name, units=2, jitter=0.3, interval=0.05), 5)
+    assert (paid, refused, info["products"], info["tripped"]) == (2.0, [], 2, False)
 
 
 def test_the_same_seed_is_the_same_episode() -> None:
@@ -93,7 +93,7 @@ def test_agents_by_chance_touch_nothing(name: str) -> None:
     """20 times a second. At the start, robots stand under the parts of their feeders: they were
     moved about there by any setpoint, since that was not on their way."""
     env = env_of(name, units=3, interval=0.05)
-    for seed in range(4):
+    for seed in range(2):
         env.reset(seed=seed)
         env.action_space.seed(seed)
         for _ in range(100):

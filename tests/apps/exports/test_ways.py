@@ -161,7 +161,7 @@ def test_what_a_unit_made_alone_needs_at_once_is_refused() -> None:
 
 def test_pairs_that_are_alike_are_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """With the same answer as each by itself, and as by all facets where faces tell enough."""
-    layout, clearance = read("examples/lamp.pag").layout, 0.05
+    layout, clearance = read("examples/peg.pag").layout, 0.05
     net, back, judge = coordinated(layout), awaited_positions(layout), nearness.Nearness(clearance)
     pairs = [*nearness.near([*presences(layout, net, back)], clearance)]
     judged = [judge.nearer(pair) for pair in pairs]

@@ -86,7 +86,7 @@ def test_a_front_has_what_it_must_have(front: ParetoFront) -> None:
 
 
 def test_no_point_is_worse_than_the_form_of_the_paper(quick: Project) -> None:
-    front = pareto(quick, Effort(factories=12))
+    front = pareto(quick, Effort(factories=8))
     paper = front.written
     assert paper is not None
     assert {node.operation for node in quick.pag.nodes} == {"mate", "atomic"}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from factory.apps.planning.blocking import blocking
+from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.titles import Titles
@@ -73,25 +74,29 @@ def faults(made: Engineered, found: Planned) -> list[str]:
 
 def planned(made: Engineered, folder: Path, options: PlanOptions) -> Planned:
     source = read_source(write_stl(made.parts, folder), TEMPLATES, SourceOptions("mm"))
+    return plan_of(source, options)
+
+
+def plan_of(source: InPlace, options: PlanOptions) -> Planned:
     found = plan(source, options)
     assert isinstance(found, Planned)
     return found
 
 
-@pytest.mark.parametrize("lay_out", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_the_order_is_that_of_an_engineer(lay_out: bool, tmp_path: Path) -> None:
+@pytest.mark.slow
+def test_orders_are_those_of_an_engineer_with_a_layout(tmp_path: Path) -> None:
     assert len(MADE) == 20
     wrong = {}
     for make in MADE:
         made = make()
-        found = planned(made, tmp_path / make.__name__, PlanOptions(lay_out=lay_out))
+        found = planned(made, tmp_path / make.__name__, PlanOptions())
         if bad := faults(made, found):
             wrong[make.__name__] = bad
     assert len(MADE) - len(wrong) >= ENOUGH, wrong
 
 
-SEEN = ("upright_flange", "keyed_shaft", "clamp")
-"""Products whose ways are always looked at."""
+SEEN = ("upright_flange", "keyed_shaft", "clamp", "hinge", "toy_car", "battery_box")
+"""Products that are always planned."""
 
 
 @pytest.mark.parametrize(
@@ -99,12 +104,15 @@ SEEN = ("upright_flange", "keyed_shaft", "clamp")
     [pytest.param(make, marks=() if make.__name__ in SEEN else pytest.mark.slow) for make in MADE],
     ids=lambda make: make.__name__,
 )
-def test_nothing_is_cut_on_the_way(make: object, tmp_path: Path) -> None:
+def test_the_order_is_that_of_an_engineer_and_nothing_is_cut_on_the_way(
+    make: Callable[[], Engineered], tmp_path: Path
+) -> None:
     """The greatest volume that what comes has in common with what stands is that of when it is
     there: none."""
-    source = read_source(write_stl(make().parts, tmp_path), TEMPLATES, SourceOptions("mm"))  # type: ignore[operator]
-    found = plan(source, QUICK)
-    assert isinstance(found, Planned)
+    engineered = make()
+    source = read_source(write_stl(engineered.parts, tmp_path), TEMPLATES, SourceOptions("mm"))
+    found = plan_of(source, QUICK)
+    assert faults(engineered, found) == []
     made = planned_product(source, found.tree, found.orientation)
     product = product_geometry(made.pag, made.files)
     judged = matings(expand(made.pag, TEMPLATES), product)

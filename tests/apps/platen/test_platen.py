@@ -48,7 +48,7 @@ def straight() -> Layout:
 def found(straight: Layout) -> list[Layout]:
     """What a short search finds for it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(compacting, "TRIES", 80)
+        patch.setattr(compacting, "TRIES", 40)
         return compacted(straight, PACE)
 
 

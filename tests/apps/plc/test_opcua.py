@@ -46,7 +46,7 @@ def ran(simulation: Simulation, max_time: float = 60.0) -> Run:
     return watched(simulation, every_tick=True, max_time=max_time)
 
 
-@pytest.mark.parametrize("scan", [4, 20])
+@pytest.mark.parametrize("scan", [pytest.param(4, marks=pytest.mark.slow), 20])
 def test_three_products_through_a_socket(scan: int) -> None:
     simulation, served = plant()
     plc = Plc(text("paper", scan))
