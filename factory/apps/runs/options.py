@@ -155,11 +155,9 @@ class RunOptions:
     def _fuses(self, layout: Layout) -> bool:
         """Whether parts joined for good become one body. Raises InputError (Usage) where they have
         to, and shall not."""
-        from factory.floor.geometry.fused_bodies import takes_wholes
-
         if self.fuse is None:
             return fusing_pays(layout.factory, layout.product)
-        if not self.fuse and takes_wholes(layout.factory):
+        if not self.fuse and layout.factory.takes_wholes:
             why = "an arm takes sub-assemblies, and each of these is one body"
             raise usage_error(why, "leave out --no-fuse")
         return self.fuse

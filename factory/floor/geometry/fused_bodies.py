@@ -89,19 +89,8 @@ class FusedBodies:
         return [*pairs(one, other)]
 
 
-def takes_wholes(factory: Factory) -> bool:
-    """Whether a robot that moves several joints takes sub-assemblies: it may hold a part otherwise
-    within one than when it brought that part to it, so each is one body."""
-    return any(
-        factory.operations[tour[0]].inputs
-        for robot in factory.robots
-        if robot.body.first.moves
-        for tour in factory.tours[robot.index]
-    )
-
-
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
-    """The bodies of a factory's run; with `fuse`, or where a robot `takes_wholes`, every operation
+    """The bodies of a factory's run; with `fuse`, or where an arm `takes_wholes`, every operation
     with two inputs or more makes one of its own. Mass and inertia add up from the inputs, so this
     is linear in the labels, but for the lists of parts."""
     solids = product.solids
@@ -111,7 +100,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBo
         label: float(np.linalg.norm(solid.corners - solid.centre, axis=1).max())
         for label, solid in solids.items()
     }
-    if not (fuse or takes_wholes(factory)):
+    if not (fuse or factory.takes_wholes):
         return FusedBodies(factory.contents, centre, mass, radius, {})
     inertia = {label: solid.inertia for label, solid in solids.items()}
     carried: dict[str, tuple[str, ...]] = {}

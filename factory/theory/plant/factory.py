@@ -311,6 +311,17 @@ class Factory(Pictured):
         return next(number for number, inside in enumerate(brought) if parts <= inside)
 
     @cached_property
+    def takes_wholes(self) -> bool:
+        """Whether a robot that moves several joints takes sub-assemblies: it may hold a part
+        otherwise within one than when it brought that part to it, so each is one body."""
+        return any(
+            self.operations[tour[0]].inputs
+            for robot in self.robots
+            if robot.body.first.moves
+            for tour in self.tours[robot.index]
+        )
+
+    @cached_property
     def joins(self) -> Joins:
         """For the end of each operation its start and the ends of the operations that made its
         inputs: the transitions that are undone as often as the end, since nothing is taken apart
