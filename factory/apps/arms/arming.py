@@ -117,21 +117,22 @@ def _others(
 
 def on_rails(project: Project, pag: PAG, pile: str) -> Project:
     """The project that makes a sub-assembly of a cell's PAG, or all of it, on rails, with an
-    `insert` for each `place`."""
+    `insert` for each `place`, and parts presented as they are placed."""
     sources = {node.label: node.inputs[0] for node in pag.nodes if node.operation in MOVES}
     nodes = dict[str, Assembly]()
     for node in pag.nodes:
         if node.label not in sources:
             inputs = tuple(_source(sources, label) for label in node.inputs)
             operation = "insert" if node.operation == "place" else node.operation
+            kept = tuple(one for one in node.parameters if one.name != "fed")
             nodes[node.label] = replace(
-                node, operation=operation, inputs=inputs, input_positions=()
+                node, operation=operation, inputs=inputs, input_positions=(), parameters=kept
             )
-    kept, stack = set[str](), [_source(sources, pile)]
+    within, stack = set[str](), [_source(sources, pile)]
     while stack:
-        kept.add(label := stack.pop())
+        within.add(label := stack.pop())
         stack += nodes[label].inputs
-    chosen = tuple(node for node in nodes.values() if node.label in kept)
+    chosen = tuple(node for node in nodes.values() if node.label in within)
     return project.with_pag(replace(pag, root=_source(sources, pile), nodes=chosen, count=None))
 
 

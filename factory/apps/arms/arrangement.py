@@ -18,6 +18,7 @@ from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import LANE, Box, Line, Point2, overlap
 from factory.apps.arms.reach import Ring, ring_of
+from factory.floor.geometry.turning import presented
 from factory.floor.layout.dimensions import PAYLOAD
 
 CLOSER = 0.02
@@ -162,7 +163,7 @@ class Arrangement(Handling):
         angles, taken = [0.0, 0.0], [*map(_behind, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
-            solid = self.product.solids[label]
+            solid = presented(self.product.solids[label])
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
             room = (self.near - beside - wide) / radius

@@ -77,6 +77,11 @@ class Burden:
         return total
 
     @property
+    def fed(self) -> float:
+        """Angle about the vertical by which it is turned where it is taken [rad]."""
+        return self.solids[0].fed if self.source is None else 0.0
+
+    @property
     def held(self) -> str:
         """The part that a pad is on."""
         return self._grip[0]

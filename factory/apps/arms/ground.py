@@ -48,7 +48,7 @@ class CellGround(Ground):
             carrier = factory.by_label[label].carrier
             rails[carrier] = project.with_settings(settings).layout
         pace = WayLimits(settings.speed, settings.acceleration)
-        return laid_out(factory, rails, self.model, pace)
+        return laid_out(factory, product, rails, self.model, pace)
 
 
 class CellProject(Project):

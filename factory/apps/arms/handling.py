@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import cos, sin
 from typing import Self
 
 import numpy as np
@@ -15,6 +16,7 @@ from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
 from factory.apps.arms.lines import Line, line_of
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
+from factory.floor.geometry.turning import presented
 from factory.floor.layout.dimensions import PAYLOAD
 
 ABOVE = 0.018
@@ -55,12 +57,14 @@ class Handling:
 
     Attributes:
         factory: of carriers, tools that work on what these carry, and arms.
+        product: the solids.
         rails: by carrier (index), the layout on rails of what it brings, whose line and hand it
             takes; the first brings the product.
         size: of the tools' pads, the number of those that some burden has room for.
     """
 
     factory: Factory
+    product: Product
     rails: Mapping[int, Layout]
     size: int
 
@@ -70,11 +74,6 @@ class Handling:
         kept = {name: value for name, value in self.__dict__.items() if name in KEPT}
         made.__dict__.update(kept)
         return made
-
-    @property
-    def product(self) -> Product:
-        """The solids."""
-        return self.rails[0].product
 
     @property
     def clearance(self) -> float:
@@ -116,10 +115,21 @@ class Handling:
             for carrier, rails in self.rails.items()
         }
 
+    def tip_shown(self, label: str) -> Array:
+        """Where an arm's tool is on it where it is taken, as it is turned there, in the product's
+        frame (3,) [m]."""
+        burden = self.burdens[label]
+        if not burden.fed:
+            return self.tip[label]
+        x, y = (burden.low + burden.high)[:2] / 2
+        u, v, z = self.tip[label] - [x, y, 0.0]
+        c, s = cos(burden.fed), sin(burden.fed)
+        return np.array([x + c * u - s * v, y + s * u + c * v, z])
+
     @cached_property
     def show(self) -> float:
         """Height at which the bottoms of parts are shown [m]."""
-        fed = (b.solids[0] for b in self.burdens.values() if b.source is None)
+        fed = (presented(b.solids[0]) for b in self.burdens.values() if b.source is None)
         return shown_height([*fed], self.clearance)
 
     @cached_property

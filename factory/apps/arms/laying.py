@@ -19,6 +19,7 @@ from factory.api import (
     Factory,
     Guidepath,
     Layout,
+    Product,
     RunError,
 )
 from factory.apps.arms.arrangement import Arrangement
@@ -69,19 +70,24 @@ REACH = 0.2
 
 
 def laid_out(
-    factory: Factory, rails: Mapping[int, Layout], arm: ArmModel, pace: WayLimits
+    factory: Factory,
+    product: Product,
+    rails: Mapping[int, Layout],
+    arm: ArmModel,
+    pace: WayLimits,
 ) -> Layout:
     """The layout of a cell with its certificate.
 
     Args:
         factory: carriers, their tools, and arms.
+        product: the solids.
         rails: by carrier (index), the layout on rails of what it brings.
         arm: the kind of arm.
         pace: limits of the coordinate along their ways.
 
     Raises RunError: Unreachable, NoWay, ArmLoad, Layout.
     """
-    refused, cell = None, Arrangement(factory, rails, 0, with_tool(arm.chain), 0.0, 0.0)
+    refused, cell = None, Arrangement(factory, product, rails, 0, with_tool(arm.chain), 0.0, 0.0)
     for far in FAR:
         try:
             return _laid_out_at(cell.otherwise(far=far), arm, pace)
@@ -254,6 +260,7 @@ def _layout(
     return replace(
         rails,
         factory=factory,
+        product=cell.product,
         guidepaths=tuple(paths[n] for n in robots),
         visits=visits,
         hands=tuple(hands.get(n) for n in robots),

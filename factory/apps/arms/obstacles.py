@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import Array, Layout
+from factory.api import Array, Layout, Solid
 from factory.apps.arms.arrangement import Arrangement, pedestal
 from factory.apps.arms.lines import Box, Line, upright
 from factory.apps.arms.scene import StandingBox
+from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
 
 BASE = 0.24
@@ -36,11 +37,11 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
     for label, well in cell.wells.items():
         xlo, xhi, ylo, yhi = well.feeder.housing
         yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
-        yield from _part(cell, f"'{label}'", label, cell.shown(label))
+        yield from _part(presented(cell.product.solids[label]), f"'{label}'", cell.shown(label))
     for carrier, line in cell.lines.items():
         yield from line.standing
-        for label in line.rails.product.solids:
-            yield from _part(cell, placed_name(label, line), label, cell.placed(carrier))
+        for label, solid in line.rails.product.solids.items():
+            yield from _part(solid, placed_name(label, line), cell.placed(carrier))
         first = cell.factory.first(carrier).label
         feeder = feeder_of(bare, first)
         for name, box, bottom in (
@@ -57,9 +58,8 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
             yield upright(f"the base of {name}", pedestal(stand), 0.0, stand.place[2] + BASE)
 
 
-def _part(cell: Arrangement, name: str, label: str, off: Array) -> Iterator[StandingBox]:
+def _part(solid: Solid, name: str, off: Array) -> Iterator[StandingBox]:
     """The boxes round the convex pieces of a part."""
-    solid = cell.product.solids[label]
     ends = [(piece.min(axis=0), piece.max(axis=0)) for piece in solid.pieces if solid.mesh]
     for low, high in ends or [(solid.low, solid.high)]:
         xlo, ylo, zlo = (low + off).tolist()

@@ -164,10 +164,11 @@ class ArmPlanner:
 
     def _options(self, label: str, angles: Array) -> tuple[Array, Index]:
         cell = self.cell
-        turns = np.array([down(float(a) - cell.stands[self.arm].yaw) for a in angles])
-        tip = cell.tip[label]
-        ends = cell.shown(label), cell.placed(cell.burdens[label].onto)
-        shown, placed = (cell.local(self.arm, tip + off) for off in ends)
+        yaw, burden = cell.stands[self.arm].yaw, cell.burdens[label]
+        taken = np.array([down(float(a) + burden.fed - yaw) for a in angles])
+        turns = np.array([down(float(a) - yaw) for a in angles])
+        shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
+        placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto))
         spared = {*self._spared_at(label), *self._spared_under(label)}
 
         def clearance(q: Array) -> tuple[Array, Index]:
@@ -175,7 +176,7 @@ class ArmPlanner:
 
         options = candidates(
             self.chain,
-            (np.tile(shown, (len(angles), 1)), turns),
+            (np.tile(shown, (len(angles), 1)), taken),
             (np.tile(placed, (len(angles), 1)), turns),
             clearance,
             np.zeros(len(self.chain)),

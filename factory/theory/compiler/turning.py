@@ -27,6 +27,9 @@ def check_turned(
     taking = {label: o for o in operations if fed for label in o.inputs}
     for part in fed:
         label, operation = part.label, taking[part.label]
+        bringing = robots[operation.robots[operation.before.index(label)]]
+        if bringing.body.first.moves:  # it turns what it brings as it likes
+            continue
         while not (turns := _turns(robots, operation)) and _hands_over(operation):
             label, operation = operation.label, taking[operation.label]
         if not turns:

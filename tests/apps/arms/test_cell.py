@@ -180,7 +180,9 @@ def test_three_arms_have_no_room() -> None:
     templates = all_templates()
     rails = Project(read_pag(text, templates), templates)
     factory = armed(rails, ArmModel.of("six"), 3).compiled
-    place = Arrangement(factory, {0: rails.layout}, 0, ArmModel.of("six").chain, 0.0, 0.41)
+    place = Arrangement(
+        factory, rails.product, {0: rails.layout}, 0, ArmModel.of("six").chain, 0.0, 0.41
+    )
     with pytest.raises(RunError) as error:
         place.stands  # noqa: B018
     assert_layout(error.value.diagnostics, "3 arms have no room", "at most 2")

@@ -161,3 +161,21 @@ def test_eight_sub_assemblies_have_no_room() -> None:
     whole = f"p = mate ( a, {', '.join(f's{n}' for n in range(8))} )"
     why = refusal(";\n".join(["root = p", whole, *joins, base, *parts]))
     assert why.code in ("Layout", "Unreachable") and "rails" in why.hint
+
+
+def test_a_part_that_is_presented_turned_is_turned_back() -> None:
+    """By the wrist, between where it is taken and where it is placed."""
+    text = """root = p;
+p = mate ( a, b );
+a = atomic ( box = (0.09, 0.06, 0.02), pos = (0, 0, 0.01), density = 1200 );
+b = atomic ( box = (0.05, 0.02, 0.02), pos = (0.01, 0, 0.0302), density = 1200, fed = 0.6 )"""
+    layout = project(text, "six").layout
+    table = chains(layout)
+    row = table.row(layout.factory.by_label["p"].index, 1)
+    leg = table.curves.legs[row]
+    _, turns = leg.chain.tool(leg.way.at(np.array([0.0, leg.way.length]))[0])
+    turned = turns[0] @ turns[1].T
+    assert np.arctan2(turned[1, 0], turned[0, 0]) == pytest.approx(0.6, abs=1e-6)
+    made = run(layout, units=2, jitter=0.3)
+    assert made.succeeded and made.physics is not None
+    assert made.physics.unintended_contacts == 0 and made.physics.product_error_max_mm < 0.01
