@@ -29,7 +29,7 @@ from factory.apps.arms.curves import Leg, LegTable
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.load import Load
 from factory.apps.arms.model import ArmModel
-from factory.apps.arms.obstacles import floor_of
+from factory.apps.arms.obstacles import check_room, floor_of
 from factory.apps.arms.orders import (
     BEYOND,
     InEachOthersWay,
@@ -129,6 +129,7 @@ class PadTooSmall(Exception):
 def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     """The layout of a cell. Raises InEachOthersWay."""
     bare = _layout(cell, {})
+    check_room(cell, bare)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
     tours = {
         n: [_borne(cell, planner, tour, pace) for tour in planner.tours()]

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import Array, Layout, Solid
+from factory.api import Array, Diagnostic, Layout, RunError, Solid
+from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement, pedestal
-from factory.apps.arms.lines import Box, Line, upright
+from factory.apps.arms.lines import Box, Line, overlap, upright
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
@@ -42,14 +43,7 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
         yield from line.standing
         for label, solid in line.rails.product.solids.items():
             yield from _part(solid, placed_name(label, line), cell.placed(carrier))
-        first = cell.factory.first(carrier).label
-        feeder = feeder_of(bare, first)
-        for name, box, bottom in (
-            ("post", feeder.post, 0.0),
-            ("boom", feeder.boom, feeder.low),
-            ("housing", feeder.housing, feeder.low),
-        ):
-            yield upright(f"the {name} of '{first}'", box, bottom, feeder.high)
+        yield from _feeder_of(cell, carrier, bare)
     yield upright("the outfeed's shed", bare.shed, 0.0, cell.top + 0.06)
     yield upright("the outfeed", bare.outfeed, 0.0, cell.top)
     for other, stand in cell.stands.items():
@@ -65,6 +59,39 @@ def _part(solid: Solid, name: str, off: Array) -> Iterator[StandingBox]:
         xlo, ylo, zlo = (low + off).tolist()
         xhi, yhi, zhi = (high + off).tolist()
         yield StandingBox(name, (xlo, ylo, zlo), (xhi, yhi, zhi))
+
+
+def _feeder_of(cell: Arrangement, carrier: int, bare: Layout) -> Iterator[StandingBox]:
+    """What stands of a carrier's feeder."""
+    first = cell.factory.first(carrier).label
+    feeder = feeder_of(bare, first)
+    for name, box, bottom in (
+        ("post", feeder.post, 0.0),
+        ("boom", feeder.boom, feeder.low),
+        ("housing", feeder.housing, feeder.low),
+    ):
+        yield upright(f"the {name} of '{first}'", box, bottom, feeder.high)
+
+
+def check_room(cell: Arrangement, bare: Layout) -> None:
+    """Check that no carrier's feeder stands in another's, or in the way of another carrier or tool,
+    in a feeder of an arm or at an arm. Raises RunError (Layout)."""
+    for carrier in cell.lines:
+        others = [well.feeder.housing for well in cell.wells.values()]
+        others += map(pedestal, cell.stands.values())
+        for number, line in cell.lines.items():
+            if number != carrier:
+                others += [line.swept, *line.tool_boxes]
+                others += map(_plan, _feeder_of(cell, number, bare))
+        for one in _feeder_of(cell, carrier, bare):
+            if any(overlap(_plan(one), box) for box in others):
+                message = f"{one.name} has no room beside what else stands"
+                raise RunError(Diagnostic("Layout", message, None, f"smaller parts; {RAILS}"))
+
+
+def _plan(one: StandingBox) -> Box:
+    """A box on the floor [m]."""
+    return one.low[0], one.high[0], one.low[1], one.high[1]
 
 
 def floor_of(cell: Arrangement) -> Box:
