@@ -60,14 +60,16 @@ def _leg(leg: JointLeg, before: JointLeg, orders: Sequence[Order]) -> Iterator[s
         yield from _waits(factory, operation.start, orders)
         yield f'  wait_start("{label}")  # {carrier} brings what it is placed on'
     else:
-        yield f"  # fetch {label}"
+        source = next((r for r in operation.robots if r != operation.carrier), None)
+        carrier = factory.robots[operation.carrier if source is None else source].name
+        yield f"  # fetch {label}" if source is None else f"  # take from {carrier}: {label}"
         yield from _passes(leg, before, orders)
     off = begin + sign * way.off
     yield f"  movel({_joints(leg, off)})  # straight, x = {off:.4f}"
     for x in np.linspace(off, hover, VIA + 2)[1:-1].tolist():
         yield f"  movej({_joints(leg, x)}, r={BLEND:g})  # x = {x:.4f}"
     yield f"  movej({_joints(leg, hover)})  # x = {hover:.4f}"
-    if leg.brings:
+    if leg.brings or operation.inputs:
         yield f'  wait_carrier("{carrier}", "{label}")  # it stands at the station'
     else:
         yield f'  wait_part("{label}")  # its feeder shows it'

@@ -12,6 +12,7 @@ from factory.api import InputError, Project, names
 from factory.apps.arms.arming import armed, on_rails
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.orders import BEYOND
+from factory.apps.arms.program_text import program_text
 from factory.apps.runs.options import RunOptions
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -179,3 +180,9 @@ b = atomic ( box = (0.05, 0.02, 0.02), pos = (0.01, 0, 0.0302), density = 1200, 
     made = run(layout, units=2, jitter=0.3)
     assert made.succeeded and made.physics is not None
     assert made.physics.unintended_contacts == 0 and made.physics.product_error_max_mm < 0.01
+
+
+def test_the_program_says_from_where_a_sub_assembly_is_taken() -> None:
+    text = program_text(post(), 4, ())
+    assert "  # take from r3: s/taken\n" in text and "  # fetch c\n" in text
+    assert 'wait_carrier("r3", "s/taken")' in text and 'wait_part("s/taken")' not in text
