@@ -165,7 +165,7 @@ def test_each_format_is_right_for_a_cell_or_refused(small: Project) -> None:
 
 def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the search for a way gives up; both places and the line of the PAG are told."""
-    monkeypatch.setattr(planning, "leg", lambda *_: NoWay(1, 0.004, 9))
+    monkeypatch.setattr(planning, "leg", lambda *_, **__: NoWay(1, 0.004, 9))
     with pytest.raises(FactoryError) as caught:
         with_arm(read(small.file), "six").layout  # noqa: B018
     (told,) = caught.value.diagnostics

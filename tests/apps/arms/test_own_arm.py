@@ -131,7 +131,10 @@ def test_a_ring_is_where_the_tool_comes_to_all_heights() -> None:
     six, scara = shipped("six"), shipped("scara")
     ring = ring_of(six, 0.1, 0.3)
     assert ring is not None and ring.base == 0.10
-    assert 0.1 < ring.inner < ring.near < ring.outer < 1.0
+    assert 0.1 < ring.inner < ring.at(0.41) < ring.outer < 1.0
+    broad = ring_of(six, 0.1, 0.3, 0.1)
+    assert broad is not None and broad.at(0.0) == broad.inner + 0.1
+    assert broad.at(1.0) == broad.outer - 0.1
     low = ring_of(scara, 0.02, 0.15)
     assert low is None or low.base > 0.1 or low.outer < 0.6
     assert ring_of(scara, 0.1, 0.1 + 0.3) is None

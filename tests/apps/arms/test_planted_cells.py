@@ -154,9 +154,9 @@ def bent(share: float, seen: bool) -> Changes:
 
 
 def heavy(layout: Layout) -> Layout:
-    """Parts are six times as heavy as the cell knows."""
+    """Parts are twenty times as heavy as the cell knows."""
     solids = {
-        label: replace(solid, mass=6 * solid.mass, inertia=6 * solid.inertia)
+        label: replace(solid, mass=20 * solid.mass, inertia=20 * solid.inertia)
         for label, solid in layout.product.solids.items()
     }
     return replace(layout, product=replace(layout.product, solids=solids))
@@ -212,7 +212,7 @@ FAULTS = (
     Fault("the last knot of a way is off", ("Dropped", "Contact"), layout=bent(1.0, True)),
     Fault("a knot near the last is off", ("Dropped", "Contact"), layout=bent(0.97, True)),
     Fault("a knot in the middle is off", ("Astray",), layout=bent(0.5, False), every_tick=True),
-    Fault("parts are six times as heavy", ("Dropped",), layout=heavy),
+    Fault("parts are twenty times as heavy", ("Dropped",), layout=heavy),
     Fault("grips are off by 2°", ("Missed", "HandOffTurn"), layout=turned),
 )
 
