@@ -54,11 +54,9 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def _a_cache_of_its_own(shared: Path) -> Iterator[None]:
-    """Tests leave the user's cache alone, and what they start compiles modules once for all."""
+    """Tests leave the user's cache alone."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(shared / "cache"))
-        patch.setenv("PYTHONPYCACHEPREFIX", str(shared / "compiled"))
-        patch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
         yield
 
 
