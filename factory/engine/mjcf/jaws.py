@@ -19,7 +19,7 @@ from factory.engine.mjcf.stops import stops_of
 from factory.floor.layout.hands.clamp import Clamp
 from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
-from factory.theory.plant.gripping import JAW_PROFILE
+from factory.theory.plant.gripping import JAW_ACCELERATION, jaw_time
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.robot_bodies import Jaw
 
@@ -35,7 +35,7 @@ def clamps_of(layout: Layout) -> Iterator[tuple[Robot, Clamp]]:
 def jaw_ticks(layout: Layout, settings: Settings) -> int:
     """No stroke of a jaw takes more ticks."""
     strokes = (jaw.stroke for _, clamp in clamps_of(layout) for jaw in clamp.jaws)
-    return ceil(JAW_PROFILE.rest(max(strokes, default=0.0)) / settings.tick) + 4
+    return ceil(jaw_time(max(strokes, default=0.0)) / settings.tick) + 4
 
 
 def add_jaws(world: Element, actuator: Element, layout: Layout, settings: Settings) -> int:
@@ -64,7 +64,7 @@ def add_jaws(world: Element, actuator: Element, layout: Layout, settings: Settin
 def jaw_drive(jaw: Jaw, settings: Settings) -> Drive:
     """The drive of a jaw, as strong as its motor."""
     moved = jaw.mass + jaw.armature
-    drive = drive_for(moved, 0.0, JAW_PROFILE.acceleration, settings, HOIST_STIFFNESS)
+    drive = drive_for(moved, 0.0, JAW_ACCELERATION, settings, HOIST_STIFFNESS)
     return replace(drive, force=jaw.force)
 
 

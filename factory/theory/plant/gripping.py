@@ -10,23 +10,29 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import ceil
 
-from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import RobotBody
 
-JAW_PROFILE = SpeedProfile(0.1, 1.0)
-"""The speed [m/s] and the acceleration [m/s²] of jaws."""
+JAW_SPEED, JAW_ACCELERATION = 0.1, 1.0
+"""Of jaws [m/s; m/s²]."""
 
 MARGIN = 0.03
 """How much longer a robot dwells than its jaws take [s]."""
 
 
+def jaw_time(stroke: float) -> float:
+    """How long a jaw takes from rest to rest over a stroke [m; s]."""
+    from factory.theory.control.profile import SpeedProfile
+
+    return SpeedProfile(JAW_SPEED, JAW_ACCELERATION).rest(stroke)
+
+
 def closing_time(body: RobotBody) -> float:
     """How long a robot dwells where it takes something [s]: until its jaws are closed, 0 without
     jaws."""
-    longest = max((JAW_PROFILE.rest(jaw.stroke) for jaw in body.jaws), default=0.0)
+    longest = max((jaw_time(jaw.stroke) for jaw in body.jaws), default=0.0)
     return ceil(longest * 100 - 1e-6) / 100 + MARGIN * bool(body.jaws)
 
 

@@ -16,7 +16,7 @@ from factory.engine.simulation.mujoco.sleep import Sleep
 from factory.engine.simulation.mujoco.strokes import Strokes, Stroking
 from factory.support.arrays import Index
 from factory.support.engine import mujoco
-from factory.theory.plant.gripping import JAW_PROFILE, takes
+from factory.theory.plant.gripping import JAW_ACCELERATION, JAW_SPEED, takes
 from factory.theory.plant.operation import Operation
 
 
@@ -48,7 +48,7 @@ class Jaws:
             return
         joint = np.array([m.joint(name).id for name in called])
         actuators = np.array([m.actuator(name).id for name in called])
-        body, limits = m.jnt_bodyid[joint], (JAW_PROFILE.speed, JAW_PROFILE.acceleration)
+        body, limits = m.jnt_bodyid[joint], (JAW_SPEED, JAW_ACCELERATION)
         inertia = m.body_subtreemass[body] + m.dof_armature[m.jnt_dofadr[joint]]
         drives = Drives(arrays, d, actuators, inertia.round(9))
 
