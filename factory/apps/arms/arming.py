@@ -73,11 +73,11 @@ def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
     made = _lowering(project, model)
-    piles = [node for node in made.pag.nodes if node.operation == "pick"]
+    piles = piles_of(made.pag)
     if arms > 1 and piles:
-        message = f"'{piles[0].inputs[0]}' is a sub-assembly: one arm makes what has such"
+        message = f"'{piles[0]}' is a sub-assembly: one arm makes what has such"
         hint = f"one arm: --arm {model.kind}; {RAILS}"
-        raise InputError(Diagnostic("NoCell", message, piles[0].position, hint))
+        raise InputError(Diagnostic("NoCell", message, made.pag[piles[0]].position, hint))
     crew = tuple(_crew(made.compiled, model.kind, arms))
     return made.with_plan(Plan(turns=(crew,), lifts=frozenset()))
 
@@ -103,16 +103,21 @@ def _lowering(project: Project, model: ArmModel) -> Project:
 
 
 def _others(
-    pag: PAG, orders: Mapping[str, Sequence[str]], stuck: Mapping[str, tuple[str, str]]
+    pag: PAG, orders: Mapping[str, Sequence[str]], stuck: Sequence[tuple[str, str]]
 ) -> Iterator[tuple[str, Sequence[str]]]:
     """Other orders of the inputs of nodes, one of which is stuck in the one of `orders`."""
-    for node, part in stuck.values():
+    for node, part in stuck:
         inputs = orders.get(node, _piles_first(pag, node))
         if inputs != pag[node].inputs:
             yield node, pag[node].inputs
         rest = [label for label in inputs if label != part]
         for place in range(inputs.index(part) - 1, 0, -1):
             yield node, (*rest[:place], part, *rest[place:])
+
+
+def piles_of(pag: PAG) -> list[str]:
+    """The sub-assemblies that arms take, as they stand there."""
+    return [node.inputs[0] for node in pag.nodes if node.operation == "pick"]
 
 
 def on_rails(project: Project, pag: PAG, pile: str) -> Project:
@@ -166,13 +171,13 @@ def _placing(project: Project, model: ArmModel, orders: Mapping[str, Sequence[st
     )
 
 
-def _not_lowered(project: Project) -> dict[str, tuple[str, str]]:
-    """The joins whose last input cannot be lowered: the node and the input of the PAG, by label."""
-    approaches, stuck = project.approaches, dict[str, tuple[str, str]]()
+def _not_lowered(project: Project) -> list[tuple[str, str]]:
+    """The joins whose last input cannot be lowered: the node of the PAG and its input."""
+    approaches, stuck = project.approaches, list[tuple[str, str]]()
     for node in project.pag.nodes:
         approach = approaches.get(node.label)
         if len(node.inputs) > 1 and approach and approach.lowered != node.inputs[-1]:
-            stuck[node.label] = node.label.partition("/")[0], node.inputs[-1].partition("/")[0]
+            stuck.append((node.label.partition("/")[0], node.inputs[-1].partition("/")[0]))
     return stuck
 
 

@@ -16,10 +16,11 @@ from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.handling import Handling
-from factory.apps.arms.lines import LANE, Box, Line, Point2, overlap
+from factory.apps.arms.lines import LANE, Line, overlap
 from factory.apps.arms.reach import Ring, ring_of
 from factory.floor.geometry.turning import presented
 from factory.floor.layout.dimensions import PAYLOAD
+from factory.floor.layout.guidepath import Box, Point2
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""

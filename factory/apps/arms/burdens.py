@@ -10,6 +10,7 @@ import numpy as np
 
 from factory.api import Array, Factory, Operation, Product, Solid
 from factory.apps.arms.body import PAD_RADIUS
+from factory.apps.arms.chain import steiner
 from factory.floor.geometry.suction import PadPlace, pad_place
 
 SHARES = 0.45, 0.35, 0.25
@@ -70,11 +71,8 @@ class Burden:
     @cached_property
     def inertia(self) -> Array:
         """Its inertia tensor about that (3, 3) [kg m²]."""
-        total = np.zeros((3, 3))
-        for solid in self.solids:
-            off = solid.centre - self.centre
-            total += solid.inertia + solid.mass * (off @ off * np.eye(3) - np.outer(off, off))
-        return total
+        about = (s.inertia + steiner(s.mass, s.centre - self.centre) for s in self.solids)
+        return np.asarray(sum(about, np.zeros((3, 3))))
 
     @property
     def fed(self) -> float:

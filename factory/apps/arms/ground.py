@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from factory.api import Factory, Layout, Product, Project, Settings, usage_error
-from factory.apps.arms.arming import armed, on_rails
+from factory.apps.arms.arming import armed, on_rails, piles_of
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.request import Ground
@@ -85,8 +85,8 @@ def cell_of(project: Project, model: ArmModel, arms: int) -> CellProject:
     """The project in which so many arms of a kind place all parts but the first. Raises InputError
     (NoCell) for what a cell cannot make."""
     made = armed(project, model, arms)
-    piles = [node.inputs[0] for node in made.pag.nodes if node.operation == "pick"]
-    rails = {pile: on_rails(project, made.pag, pile) for pile in (made.pag.root, *piles)}
+    piles = made.pag.root, *piles_of(made.pag)
+    rails = {pile: on_rails(project, made.pag, pile) for pile in piles}
     values = {name: getattr(made, name) for name in made.__dataclass_fields__}
     ground = CellGround(model=model, arms=arms, source=project, rails=rails)
     return CellProject(**{**values, "ground": ground})

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cos, sin
 from typing import Self
 
 import numpy as np
@@ -16,7 +15,7 @@ from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
 from factory.apps.arms.lines import Line, line_of
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
-from factory.floor.geometry.turning import presented
+from factory.floor.geometry.turning import about_vertical, axis_of, presented
 from factory.floor.layout.dimensions import PAYLOAD
 
 ABOVE = 0.018
@@ -121,10 +120,8 @@ class Handling:
         burden = self.burdens[label]
         if not burden.fed:
             return self.tip[label]
-        x, y = (burden.low + burden.high)[:2] / 2
-        u, v, z = self.tip[label] - [x, y, 0.0]
-        c, s = cos(burden.fed), sin(burden.fed)
-        return np.array([x + c * u - s * v, y + s * u + c * v, z])
+        axis = axis_of(burden.solids[0])
+        return np.asarray(about_vertical(burden.fed) @ (self.tip[label] - axis) + axis)
 
     @cached_property
     def show(self) -> float:

@@ -141,7 +141,7 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     layout = _layout(cell, tours, chains)
     alone = homes(layout)
     asked = [*orders_of(cell, tours, private), *orders_at_sources(cell, tours, alone)]
-    apart = exclusions_of(layout, asked, tours)
+    apart = exclusions_of(layout, asked, tours, alone)
     return replace(layout, certificate=_certificate(cell, layout, apart))
 
 

@@ -16,13 +16,8 @@ from factory.api import Array, Factory, Guidepath, Layout, Operation, Product
 from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.certificate import PAYLOAD_BODY, Region
 from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
+from factory.floor.layout.guidepath import Box, Point2, hull, moved
 from factory.floor.layout.hands.hand import Hand
-
-Box = tuple[float, float, float, float]
-"""(xlo, xhi, ylo, yhi) [m]."""
-
-Point2 = tuple[float, float]
-"""A point on the floor [m]."""
 
 LANE = 0.32
 """From the station to either end of a line, without the length of what it carries [m]."""
@@ -144,17 +139,14 @@ class Line:
         """The floor that a tool takes."""
         assert self.rails.certificate is not None
         (x, y), (u, v) = self.rails.guidepaths[tool.there].a, self.station
-        along, across = u + tool.ahead + self.off[0] - x, v + self.off[1] - y
+        by = u + tool.ahead + self.off[0] - x, v + self.off[1] - y
         for one in self.rails.certificate.regions:
             if one.robot == tool.there:
-                xlo, xhi, ylo, yhi = one.box
-                box = xlo + along, xhi + along, ylo + across, yhi + across
-                yield replace(one, robot=tool.robot, box=box)
+                yield replace(one, robot=tool.robot, box=moved(one.box, by))
 
     def box_of(self, tool: Tool) -> Box:
         """All that a tool takes [m]."""
-        xlo, xhi, ylo, yhi = zip(*(region.box for region in self.regions_of(tool)), strict=True)
-        return min(xlo), max(xhi), min(ylo), max(yhi)
+        return hull([region.box for region in self.regions_of(tool)])
 
     @property
     def tool_boxes(self) -> list[Box]:
@@ -190,8 +182,7 @@ class Line:
     @property
     def band(self) -> tuple[float, float]:
         """What the line takes across it, with its tools, from the station [m]."""
-        boxes = [self.swept, *map(self.box_of, self.tools)]
-        low, high = min(box[2] for box in boxes), max(box[3] for box in boxes)
+        _, _, low, high = hull([self.swept, *self.tool_boxes])
         return low - self.station[1], high - self.station[1]
 
     def with_tools(self, near: float, room: Sequence[Box]) -> Line:

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from factory.api import Array, Diagnostic, Layout, RunError, Solid
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement, pedestal
-from factory.apps.arms.lines import Box, Line, overlap, upright
+from factory.apps.arms.lines import Line, overlap, upright
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.guidepath import Box
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""

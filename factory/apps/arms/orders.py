@@ -14,7 +14,6 @@ from factory.apps.arms.planning import ArmPlanner, ArmTour
 from factory.apps.arms.sharing import SweptArm, clear_share
 from factory.floor.layout.certificate import Exclusions, Precedence
 from factory.floor.layout.coordinating import with_machines
-from factory.floor.layout.hands.leaving import homes
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
@@ -124,11 +123,15 @@ def orders_at_sources(
 
 
 def exclusions_of(
-    layout: Layout, asked: Sequence[Away], tours: Mapping[int, Sequence[ArmTour]]
+    layout: Layout,
+    asked: Sequence[Away],
+    tours: Mapping[int, Sequence[ArmTour]],
+    alone: Mapping[int, float],
 ) -> Exclusions:
     """The passes and order places that are asked for; arms go by themselves to over their next
-    feeders. Raises RunError (Layout) where the net with them is not live."""
-    backs = homes(layout)
+    feeders, carriers to where they are `alone` [m]. Raises RunError (Layout) where the net with
+    them is not live."""
+    backs = {**alone}
     for arm, each in tours.items():
         backs[arm] = round(min(t.begins + t.goes.hover for t in each), 6)
     passes = tuple(dict.fromkeys(away.past for away in asked))

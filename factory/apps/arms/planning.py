@@ -40,9 +40,6 @@ CERTAIN, CERTAIN_AT_END = 0.004, 2e-4
 SAME = 0.03
 """Places that are nearer are one, as far as the tool's angle is concerned [m]."""
 
-VISITED = 0.002
-"""Clearance that is asked of configurations in which parts are taken and placed [m]."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ArmTour:
@@ -169,10 +166,11 @@ class ArmPlanner:
         turns = np.array([down(float(a) - yaw) for a in angles])
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
         placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto))
-        spared = {*self._spared_at(label), *self._spared_under(label)}
+        at, under = self._spared_at(label), self._spared_under(label)
+        spared = (at | under) - (self._moving - (at & under))
 
         def clearance(q: Array) -> tuple[Array, Index]:
-            return self.scene.margins(q, "", VISITED, spared)
+            return self.scene.margins(q, "", CERTAIN_AT_END, spared)
 
         options = candidates(
             self.chain,
@@ -190,7 +188,8 @@ class ArmPlanner:
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
     ) -> Diagnostic:
         position = self.cell.factory.by_label[label].position
-        for up in (0.0, self.cell.enters(label).length):
+        rise = self.cell.enters(label).length
+        for up in (0.0, rise):
             for place in places:
                 why = diagnose_reach(self.chain, place + np.array([0.0, 0.0, up]), turn)
                 if why is not None:
@@ -200,7 +199,7 @@ class ArmPlanner:
         if blocked:
             message += f": {self.scene.say(blocked.pair)} are in each other's way"
         else:
-            message += f" and goes straight up by {up * 1e3:.0f} mm at both ends"
+            message += f" and goes straight up by {rise * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
     def _spared_at(self, label: str, loaded: bool = False) -> set[str]:

@@ -64,12 +64,12 @@ class Grip:
 def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
     """All grips of a layout's robots on its bodies, robot by robot."""
     factory, product = layout.factory, layout.product
-    arms = layout.chains.robots if layout.chains else ()  # these turn, and hold a part as it is
+    chains = layout.chains.robots if layout.chains else ()  # these turn, and hold a part as it is
     for robot in range(len(factory.robots)):
         for label in dict.fromkeys(bodies.handled(factory, robot)):
             turn = factory.tour_with(robot, label)
             begins, *_ = factory.tours[robot][turn]
-            brought = factory.deliveries(robot)[turn : turn + 1] if robot not in arms else ()
+            brought = factory.deliveries(robot)[turn : turn + 1] if robot not in chains else ()
             fed = next((fed_of(product, factory.contents[x]) for x in brought), 0.0)
             centre = presented(product.solids[label]).centre if fed else bodies.centre[label]
             yield Grip(robot, label, centre, layout, begins, fed)

@@ -90,9 +90,9 @@ class FusedBodies:
 
 
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
-    """The bodies of a factory's run; with `fuse`, or where an arm `takes_wholes`, every operation
-    with two inputs or more makes one of its own. Mass and inertia add up from the inputs, so this
-    is linear in the labels, but for the lists of parts."""
+    """The bodies of a factory's run; with `fuse`, or where it `takes_wholes`, every operation with
+    two inputs or more makes one of its own. Mass and inertia add up from the inputs, so this is
+    linear in the labels, but for the lists of parts."""
     solids = product.solids
     centre = {label: solid.centre for label, solid in solids.items()}
     mass = {label: solid.mass for label, solid in solids.items()}

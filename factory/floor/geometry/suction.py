@@ -81,7 +81,7 @@ def pad_place(
         empty = top - drawn.height_in(place - radius / 4, place + radius / 4)
         off = top - drawn.height_in(*under), min(empty, radius) if empty > EVEN else 0.0
         if off[0] < EVEN and not off[1]:
-            return PadPlace(_at(place, top, radius).at, radius, level=True)
+            return _at(place, top, radius, level=True)
         if off < worst:
             best, worst = _at(place, top, radius), off
     if best is None:  # of a part that is nowhere level the highest place
@@ -102,8 +102,8 @@ def _grid(solid: Solid, radius: float) -> Array:
     return np.asarray(places[order])
 
 
-def _at(place: Corner, top: float, radius: float) -> PadPlace:
-    return PadPlace(np.array([*place, top + GAP]), radius)
+def _at(place: Corner, top: float, radius: float, level: bool = False) -> PadPlace:
+    return PadPlace(np.array([*place, top + GAP]), radius, level)
 
 
 @dataclass(frozen=True, slots=True)

@@ -125,7 +125,7 @@ def _levels(
         ends = [factory.operations[tour[-1]] for tour in tours]
         below = [0.0] * len(ends)
         if robot:
-            below = [  # an arm, which takes what robots before it bring, has no level of its own
+            below = [  # carriers come first but for those that move several joints: these have none
                 elevations[o.carrier][factory.turns[o.index, o.carrier]]
                 if o.carrier < robot
                 else 0.0

@@ -44,9 +44,11 @@ def takes(operation: Operation, robot: int) -> bool:
 
 def with_closing(operations: Iterable[Operation], robots: Sequence[Robot]) -> tuple[Operation, ...]:
     """The operations, with a dwell where jaws close."""
+    if not any(robot.body.jaws for robot in robots):
+        return tuple(operations)
 
     def dwell(o: Operation) -> float:
         times = (closing_time(robots[robot].body) for robot in o.robots if takes(o, robot))
         return max([o.dwell, *times])
 
-    return tuple(o if dwell(o) == o.dwell else replace(o, dwell=dwell(o)) for o in operations)
+    return tuple(replace(o, dwell=dwell(o)) for o in operations)

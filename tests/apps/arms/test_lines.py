@@ -4,15 +4,18 @@ leave."""
 from __future__ import annotations
 
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
-from factory.api import InputError, Project, names
+from factory.api import Array, InputError, Project, names
+from factory.apps.arms import obstacles, planning
 from factory.apps.arms.arming import armed, on_rails
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.orders import BEYOND
 from factory.apps.arms.program_text import program_text
+from factory.apps.arms.scene import Scene
 from factory.apps.runs.options import RunOptions
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -20,7 +23,7 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import all_templates
 from factory.theory.lang import read_pag
 from factory.theory.nets.verify import verify
-from tests.arm_cells import chains, project, refusal, run
+from tests.arm_cells import SMALL, chains, project, refusal, run
 
 POST = """root = p;
 p = inspect ( q, dwell = 0.2 ); q = mate ( a, s );
@@ -48,6 +51,12 @@ def post() -> Layout:
 def plain(text: str) -> Project:
     templates = all_templates()
     return Project(read_pag(text, templates), templates)
+
+
+@cache
+def six() -> ArmModel:
+    """The shipped arm of six axes."""
+    return ArmModel.of("six")
 
 
 def does(layout: Layout, robot: int) -> list[str]:
@@ -102,25 +111,16 @@ def test_a_tour_that_begins_where_the_last_ended_turns_the_tool() -> None:
 
 def test_what_can_only_be_lowered_before_comes_before() -> None:
     """The block goes under the roof before that is on."""
-    made = armed(plain(ROOF), ModelSix.of())
+    made = armed(plain(ROOF), six())
     order = [n.inputs[-1] for n in made.pag.nodes if n.operation == "place"]
     assert order == ["d", "s/taken", "c"]
     lowered = {label: a.lowered for label, a in made.approaches.items() if len(label) > 1}
     assert all(lowered.values())
 
 
-class ModelSix:
-    """The shipped arm of six axes."""
-
-    @staticmethod
-    @cache
-    def of() -> ArmModel:
-        return ArmModel.of("six")
-
-
 def test_a_pile_on_rails_is_what_the_cell_makes_of_it() -> None:
     """Without what moves it only, and each place an insert."""
-    made = armed(plain(POST), ModelSix.of())
+    made = armed(plain(POST), six())
     rails = on_rails(plain(POST), made.pag, "s/shown").pag
     assert rails.root == "s" and {n.label: n.operation for n in rails.nodes} == {
         "s": "press",
@@ -186,3 +186,31 @@ def test_the_program_says_from_where_a_sub_assembly_is_taken() -> None:
     text = program_text(post(), 4, ())
     assert "  # take from r3: s/taken\n" in text and "  # fetch c\n" in text
     assert 'wait_carrier("r3", "s/taken")' in text and 'wait_part("s/taken")' not in text
+
+
+def test_what_is_in_the_product_counts_where_a_part_is_placed() -> None:
+    """A configuration that takes a link through what is there already is none."""
+    asked, planned = list[set[str]](), planning.candidates
+
+    def seen(scene: Scene, q: Array, label: str, need: float, spared: set[str]) -> object:
+        asked.append({*scene.obstacles} - spared)
+        return np.ones(len(q)), np.zeros(len(q), int)
+
+    def tried(chain: object, takes: object, puts: object, clear: object, *more: object) -> object:
+        with patch.object(Scene, "margins", seen):
+            clear(np.zeros((1, 6)))  # type: ignore[operator]
+        return planned(chain, takes, puts, clear, *more)  # type: ignore[arg-type]
+
+    with patch.object(planning, "candidates", tried):
+        assert project(SMALL, "six").layout.certificate
+    motor, lid = asked
+    assert "'tub' in the product" in motor and "'motor' in the product" not in motor
+    assert {"'tub' in the product", "'motor' in the product"} <= {*lid}
+    assert "'lid' in the product" not in lid and "the carrier" not in lid
+
+
+def test_a_feeder_in_the_way_of_another_is_refused() -> None:
+    """A pedestal as wide as the cell stands in every feeder."""
+    with patch.object(obstacles, "pedestal", lambda stand: (-9.0, 9.0, -9.0, 9.0)):
+        why = refusal(SMALL)
+    assert why.code == "Layout" and "the post of 'tub' has no room" in why.message
