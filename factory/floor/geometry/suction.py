@@ -128,10 +128,14 @@ class Terrain:
 
 def _height_in(near: Array, low: Corner, high: Corner) -> float:
     """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
-    at the corners of the rectangle, at theirs, and where edges cross its sides."""
+    at their corners and, of those that reach higher than these, at the corners of the rectangle and
+    where edges cross its sides."""
+    corners = near.reshape(-1, 3)
+    top = _highest(corners, low, high)
+    near = near[near[..., 2].max(axis=1, initial=-np.inf) > top]
     if not len(near):
-        return -np.inf
-    points = [near.reshape(-1, 3), _over_corners(near, low, high)]
+        return top
+    points = [_over_corners(near, low, high)]
     begin, way = near.reshape(-1, 3), (np.roll(near, -1, axis=1) - near).reshape(-1, 3)
     for axis in (0, 1):
         for side in (low[axis], high[axis]):
@@ -141,9 +145,13 @@ def _height_in(near: Array, low: Corner, high: Corner) -> float:
             at = begin[crosses] + share[crosses, None] * way[crosses]
             at[:, axis] = side
             points.append(at)
-    every = np.concatenate(points)
-    inside = ((every[:, :2] >= low) & (every[:, :2] <= high)).all(axis=1)
-    return float(every[inside, 2].max(initial=-np.inf))
+    return max(top, _highest(np.concatenate(points), low, high))
+
+
+def _highest(points: Array, low: Corner, high: Corner) -> float:
+    """The greatest height of the points (n, 3) over a rectangle in plan, -inf if there are none."""
+    inside = ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
+    return float(points[inside, 2].max(initial=-np.inf))
 
 
 def _over_corners(triangles: Array, low: Corner, high: Corner) -> Array:

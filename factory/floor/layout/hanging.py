@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from factory.floor.geometry.common_places import Top, common_places
-from factory.floor.geometry.solids import Solid
+from factory.floor.geometry.solids import Product, Solid
 from factory.floor.geometry.suction import (
     GAP,
     NARROWEST,
@@ -57,7 +57,7 @@ class Hanging:
 
     @classmethod
     def _of(cls, layout: Layout) -> Hanging:
-        pads, slider = _FeederPads(), dict[str, str]()
+        pads, slider = layout.product.kept(_FeederPads), dict[str, str]()
         places: dict[str, PadPlace] = {}
         for line in lines_of(layout):
             rises = bool(line) and line[0].feeder.rises
@@ -81,9 +81,9 @@ class Hanging:
 
 
 class _FeederPads:
-    """Places of feeders' pads on parts, computed once for equal parts."""
+    """Places of feeders' pads on a product's parts, computed once for equal parts."""
 
-    def __init__(self) -> None:
+    def __init__(self, _: Product) -> None:
         self._found: dict[object, PadPlace] = {}
 
     def of(self, outlet: Outlet) -> PadPlace:
