@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, MonitorSubject, Operation, Simulation, names
+from factory.api import HIDDEN, Array, MonitorSubject, Operation, Replica, Simulation, names
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
@@ -27,6 +27,9 @@ SCRIPTS = (
     "live/live.js",
 )
 """In the order in which they run."""
+
+SAMPLES = 24
+"""Each way of a robot that moves several joints is looked at in so many places."""
 
 
 def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
@@ -76,34 +79,66 @@ def stage_of(simulation: Simulation) -> DrawnFactory:
     """What there is to be drawn of a simulation that has not begun; bodies are where they are in
     the world."""
     layout, world = simulation.layout, simulation.physical
-    m, d, factory, (at, _) = world.m, world.d, layout.factory, world.motion.axes.measured(world.d)
+    m, d, factory = world.m, world.d, layout.factory
     model = simulation.model
     assert model is not None
-    low, high = d.xpos.copy(), d.xpos.copy()
-    for robot in factory.robots:
-        body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
-        ends, x = [layout.home(robot.index, o) for o in robot.operations], float(at[robot.index])
-        away = np.concatenate(path.pieces(min(ends), max(ends))) - path.pieces(x, x)[0][0]
-        places = d.xpos[body] + np.pad(away, ((0, 0), (0, 1)))
-        low[body] = np.minimum(low[body], places.min(axis=0))
-        high[body] = np.maximum(high[body], places.max(axis=0))
     return DrawnFactory(
         factory,
         m,
         d.xpos.copy(),
         d.xquat.copy(),
-        np.stack([low, high]),
+        _reach(simulation),
         MonitorSubject.of_run(simulation).as_json()["places"],
         stations(factory, m, _ends(simulation)),
         drawn(m, model.xml, model.files),
     )
 
 
+def _reach(simulation: Simulation) -> Array:
+    """The least and the greatest position (2, bodies, 3) to which robots bring their bodies [m]."""
+    layout, world = simulation.layout, simulation.physical
+    m, (at, _) = world.m, world.motion.axes.measured(world.d)
+    reach = np.stack([world.d.xpos] * 2)
+    chains = layout.chains.robots if layout.chains else ()
+    for robot in layout.factory.robots:
+        body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
+        if robot.index in chains:
+            bodies = np.flatnonzero(m.body_rootid == m.body_rootid[body])
+            places = np.array([every[bodies] for every in _along(simulation, robot.index)])
+            reach[:, bodies] = places.min(axis=0), places.max(axis=0)
+            continue
+        ends, x = [layout.home(robot.index, o) for o in robot.operations], float(at[robot.index])
+        away = np.concatenate(path.pieces(min(ends), max(ends))) - path.pieces(x, x)[0][0]
+        places = world.d.xpos[body] + np.pad(away, ((0, 0), (0, 1)))
+        reach[0, body] = np.minimum(reach[0, body], places.min(axis=0))
+        reach[1, body] = np.maximum(reach[1, body], places.max(axis=0))
+    return reach
+
+
+def _along(simulation: Simulation, robot: int) -> Iterator[Array]:
+    """The positions of all bodies (bodies, 3) [m] along the ways of a robot that moves several
+    joints."""
+    layout, world = simulation.layout, simulation.physical
+    axes, replica = world.motion.axes.apart(), Replica(world.m)
+    for tour in layout.factory.tours[robot]:
+        ends = [layout.visits[operation, robot].at for operation in tour]
+        for operation in tour:
+            axes.curves.take(robot, operation)
+            for x in np.linspace(min(ends), max(ends), SAMPLES):
+                qpos = world.d.qpos.copy()
+                axes.configure(qpos, np.array([robot]), np.array([x]))
+                replica.place(qpos)
+                yield replica.d.xpos.copy()
+
+
 def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Array]]:
     """The state of the engine with the robots of an operation where it ends."""
     layout, world = simulation.layout, simulation.physical
+    axes = world.motion.axes.apart()
     for operation in layout.factory.operations:
         qpos, at = world.d.qpos.copy(), layout.visits
         stops = np.array([at[operation.index, robot].at for robot in operation.robots])
-        world.motion.axes.configure(qpos, np.array(operation.robots), stops)
+        for robot in operation.robots:
+            axes.curves.take(robot, operation.index)
+        axes.configure(qpos, np.array(operation.robots), stops)
         yield operation, qpos

@@ -22,6 +22,7 @@ from factory.apps.exports import exporters
 from factory.apps.exports.chain_rest import joints_at_rest
 from factory.apps.exports.stock import written
 from factory.apps.exports.writing import export, exporter
+from factory.apps.live.page import stage_of
 from factory.apps.log.plan_file import plan_files
 from factory.apps.recovery import recover
 from factory.engine.mjcf.loading import load
@@ -178,14 +179,45 @@ def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.Mon
     assert told.hint == "leave out --arm: rails make it"
 
 
+# --- the page of a running cell ------------------------------------------------------------------
+
+
+def test_a_page_shows_all_that_an_arm_comes_to(small: Project) -> None:
+    """Bodies of the arm come no farther in a run, and nearly as far; drawing does not move it."""
+    made = Simulation(laid(small), RunRequest(units=2))
+    low, high = stage_of(made).reach
+    world = made.physical
+    arm = np.flatnonzero(world.m.body_rootid == world.m.body("r2/carriage").id)
+    least, most = world.d.xpos[arm].copy(), world.d.xpos[arm].copy()
+    while len(made.supervisor.events) < 4 * len(made.layout.factory.operations):
+        made.supervisor.step()
+        least, most = np.minimum(least, world.d.xpos[arm]), np.maximum(most, world.d.xpos[arm])
+    assert len(arm) >= 6
+    assert (low[arm] < least + 2e-3).all() and (high[arm] > most - 2e-3).all()
+    assert (least < low[arm] + 0.01).all() and (most > high[arm] - 0.01).all()
+    alone = Simulation(laid(small), RunRequest(units=2))
+    while len(alone.supervisor.events) < len(made.supervisor.events):
+        alone.supervisor.step()
+    assert [*alone.supervisor.events] == [*made.supervisor.events]
+
+
+def test_a_page_shows_where_an_arm_places(small: Project) -> None:
+    """Both parts are placed where the carrier stands in a run."""
+    made = Simulation(laid(small), RunRequest(units=1))
+    ((place, labels),) = stage_of(made).stations.items()
+    assert sorted(labels) == ["filled", "unit"]
+    while not any(event.transition == "filled_e" for event in made.supervisor.events):
+        made.supervisor.step()
+    assert made.physical.d.site("r1/nest").xpos[:2] == pytest.approx(place, abs=1e-3)
+
+
 # --- what does not go with a cell -----------------------------------------------------------------
 
 REFUSED = [
     (("run",), ("--spares", "1"), "--spares"),
     (("run",), ("--faults", "faults.toml"), "--faults"),
     (("run",), ("--faults", "faults.toml", "--spares", "1"), "--faults and --spares"),
-    (("view",), ("--port", "0"), "view"),
-    (("view",), ("--spares", "1", "--port", "0"), "view"),
+    (("view",), ("--spares", "1", "--port", "0"), "--spares"),
     (("build",), ("-o", "made"), "-o DIR"),
     (("build",), ("-o", "made", "--mjcf", "made.xml"), "-o DIR"),
     (("export",), ("--format", "dxf", "-o", "made.dxf"), "format dxf"),

@@ -54,18 +54,18 @@ def view(
     from factory.apps.live import Server, Session
     from factory.apps.live.page import page
     from factory.apps.live.server import check_server
-    from factory.apps.runs.running import campaign_of
+    from factory.apps.runs.running import campaign_of, check_run
     from factory.support.interruption import Interruption
     from factory.theory.nets.verify import proved
 
     check_server(host, expose)
-    asked.check_combination()
     project = options.project(out.silent)
-    project.compiled.check_rails("view")
+    check_run(project, asked)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    request = replace(asked, units=FOR_EVER, fuse=False).request(project)
+    apart = None if layout.factory.takes_wholes else False
+    request = replace(asked, units=FOR_EVER, fuse=apart).request(project)
     campaign = campaign_of(asked, layout.factory) if asked.recovers else None
     session = Session(lambda: Simulation(layout, request), not paused, campaign)
     shown = page(session, shlex.join(["factory", *sys.argv[1:]]))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,6 +100,11 @@ class Axes:
             curves = self.curves
             qpos[curves.qpos[rows]] = curves.ways.at(curves.now[rows], x[which])[0]
             curves.at[rows] = x[which]
+
+    def apart(self) -> Axes:
+        """The same axes for other data of the engine: which curves they follow there, and how far,
+        is nothing to these."""
+        return replace(self, curves=self.curves.apart())
 
     def off(self, d: mujoco.MjData, x: Array) -> Array:
         """Distance of all axes (axes,) from positions [m]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -63,6 +63,10 @@ class Curves:
         """Let a robot (index) follow its curve of an operation (index)."""
         if self.chains is not None and self.row[robot] >= 0:
             self.now[self.row[robot]] = self.chains.row(operation, robot)
+
+    def apart(self) -> Curves:
+        """The same curves; which are followed, and how far, is nothing to these."""
+        return replace(self, now=self.now.copy(), at=self.at.copy(), latest={})
 
     def among(self, axes: Index) -> tuple[Index, Index]:
         """Which of some axes move several joints, and their rows."""
