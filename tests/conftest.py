@@ -119,6 +119,26 @@ def run(capsys: pytest.CaptureFixture[str]) -> Terminal:
     return Terminal(capsys)
 
 
+@pytest.fixture(scope="session")
+def opencascade() -> Iterator[Any]:
+    """Converts STEP files, and has loaded OpenCASCADE once."""
+    pytest.importorskip("cascadio")
+    from tests.step_reader import loaded
+
+    with loaded() as reader:
+        yield reader
+
+
+@pytest.fixture
+def steps(opencascade: Any) -> Iterator[None]:
+    """STEP files are read without loading OpenCASCADE for each."""
+    from factory.apps.importing import scene_file
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(scene_file, "subprocess", opencascade)
+        yield
+
+
 @pytest.fixture
 def here() -> Iterator[None]:
     """Runs of a sweep are done in this process, which starts at once."""

@@ -164,21 +164,6 @@ OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
 }
 """What our writer is told to write."""
 
-QUICK = {
-    "face_colour",
-    "solvespace_pin_in_plate",
-    "three_solids_one_part",
-    "inches",
-    "two colours",
-    "assembly",
-}
-
-
-def marked(names: Mapping[str, object]) -> list[object]:
-    """Each file reads in a process of its own: the quick suite has some of each writer."""
-    return [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in names]
-
-
 def assert_read(path: Path, drawn: Mapping[str, Part]) -> None:
     source = read_source(path, TEMPLATES)
     assert sorted(part.label for part in source.parts) == sorted(drawn)
@@ -199,23 +184,27 @@ def assert_read(path: Path, drawn: Mapping[str, Part]) -> None:
     assert any("one part each" in note for note in source.notes) or not several
 
 
-@pytest.mark.parametrize("name", marked(FILES))
+@pytest.mark.usefixtures("steps")
+@pytest.mark.parametrize("name", FILES)
 def test_what_opencascade_wrote_is_read_as_it_was_drawn(name: str) -> None:
     assert_read(DATA / f"{name}.step", FILES[name])
 
 
-@pytest.mark.parametrize("name", marked(SOLVESPACE))
+@pytest.mark.usefixtures("steps")
+@pytest.mark.parametrize("name", SOLVESPACE)
 def test_what_solvespace_wrote_is_read_as_it_was_drawn(name: str) -> None:
     assert_read(DATA / f"{name}.step", SOLVESPACE[name])
 
 
-@pytest.mark.parametrize("name", marked(OWN))
+@pytest.mark.usefixtures("steps")
+@pytest.mark.parametrize("name", OWN)
 def test_what_another_writer_wrote_is_read_as_it_was_drawn(tmp_path: Path, name: str) -> None:
     text, drawn = OWN[name]
     (tmp_path / "a.step").write_text(text)
     assert_read(tmp_path / "a.step", drawn)
 
 
+@pytest.mark.usefixtures("steps")
 @pytest.mark.parametrize(("prefix", "larger"), [(".CENTI.", 10), (".DECI.", 100)])
 def test_a_large_component_has_no_finer_facets_than_its_size_asks_for(
     prefix: str, larger: int
@@ -236,6 +225,7 @@ def test_a_large_component_has_no_finer_facets_than_its_size_asks_for(
             assert sagitta <= max(1e-3 * FINE, SHARE * height)
 
 
+@pytest.mark.usefixtures("steps")
 @pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")
 @pytest.mark.parametrize(
     ("name", "parts"), [("step_face_colour", 2), ("step_two_bodies_in_one_component", 3)]
@@ -273,6 +263,7 @@ def test_a_file_that_ends_its_reader_ends_no_more(
     assert "it ended with status -6" in done.json["errors"][0]["message"]
 
 
+@pytest.mark.usefixtures("steps")
 def test_a_fault_of_ours_is_no_fault_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
