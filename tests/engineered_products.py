@@ -49,7 +49,7 @@ def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)
 
 
 def rod(
-    radius: float, low: float, high: float, at: tuple[float, float] = (0, 0), sides: int = 48
+    radius: float, low: float, high: float, at: tuple[float, float] = (0, 0), sides: int = 24
 ) -> Manifold:
     """An upright round bar."""
     return Manifold.cylinder(high - low, radius, radius, sides).translate((*at, low))

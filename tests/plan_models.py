@@ -37,7 +37,7 @@ def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)
     return Manifold.cube((x, y, z), True).translate(at)
 
 
-def rod(radius: float, length: float, axis: tuple[int, int, int] = Z, sides: int = 32) -> Manifold:
+def rod(radius: float, length: float, axis: tuple[int, int, int] = Z, sides: int = 16) -> Manifold:
     """A round bar along an axis through the origin."""
     bar = Manifold.cylinder(length, radius, radius, sides, True)
     return bar.rotate((0, 90, 0)) if axis == X else bar.rotate((90, 0, 0)) if axis == Y else bar

@@ -132,7 +132,18 @@ def example(code: str, folder: Path) -> list[str]:
     return re.findall(r"^ {4}\$ factory (.*)$", text, re.M)
 
 
-@pytest.mark.parametrize("code", [code for code in codes() if code not in NOT_PROVOKED])
+DEAR = ("Unreachable",)
+"""Codes whose examples take long; `test_check_lays_a_cell_out` has a quicker one of each."""
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        pytest.param(code, marks=pytest.mark.slow if code in DEAR else ())
+        for code in codes()
+        if code not in NOT_PROVOKED
+    ],
+)
 def test_the_example_provokes_the_code(
     code: str, run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

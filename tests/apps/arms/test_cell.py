@@ -102,6 +102,7 @@ def test_a_cell_is_made_to_the_byte(arm: str) -> None:
 
 def test_the_command_line_makes_a_cell(drive: Path) -> None:
     """In a process of its own."""
+    drive.write_text(column(0.04))
     done = spawn("run", drive, "--arm", "six", "--units", "1", "--json")
     assert done.status == 0, done.err
     assert done.json["products"] == 1 and done.json["unintended_contacts"] == 0
@@ -138,7 +139,6 @@ def test_options_that_no_cell_has_are_refused(
     [
         (SUBS, "six=2", "NoCell", "'z' is a sub-assembly: one arm", 2),
         (MIX, "six", "NoCell", "one product, not a mix", None),
-        (column(0.4), "six", "Unreachable", "above its place", 4),
     ],
 )
 def test_what_a_cell_cannot_make_is_refused_where_it_is(
@@ -165,12 +165,14 @@ def test_what_a_pad_bears_is_in_the_frame_of_its_part() -> None:
 def test_check_lays_a_cell_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """So that it foretells what an arm cannot reach."""
     file, run = tmp_path / "drive.pag", Terminal(capsys)
-    file.write_text(SMALL)
+    file.write_text(column(0.04))
     done = run("check", file, "--arm", "six", "--json")
     assert done.status == 0 and done.json["coordinated"]["live"]
     file.write_text(column(0.4))
     done = run("check", file, "--arm", "six", "--json")
-    assert done.status == 1 and done.json["errors"][0]["code"] == "Unreachable"
+    (why,) = done.json["errors"]
+    assert done.status == 1 and (why["code"], why["line"]) == ("Unreachable", 4)
+    assert "above its place" in why["message"] and "rails" in why["hint"]
     assert run("check", file).status == 0
 
 

@@ -164,6 +164,7 @@ OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
 }
 """What our writer is told to write."""
 
+
 def assert_read(path: Path, drawn: Mapping[str, Part]) -> None:
     source = read_source(path, TEMPLATES)
     assert sorted(part.label for part in source.parts) == sorted(drawn)
