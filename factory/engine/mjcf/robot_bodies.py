@@ -103,14 +103,12 @@ def _text(digits: str, at: Array, right: Array, up: Array, room: Array) -> Array
     is room [m]."""
     wide = WIDE + STEP * (len(digits) - 1)
     size = min(room[1], room[0] / wide)
-    corners = list[Array]()
-    for number, digit in enumerate(digits):
-        for stroke in DIGITS[int(digit)]:
-            left, end, low, high = STROKES[stroke]
-            for x, y in ((left, low), (end, low), (end, high), (left, high)):
-                across = x + STEP * number - wide / 2
-                corners.append(at + size * (across * right + (y - 0.5) * up))
-    return np.array(corners)
+    strokes = [(n, STROKES[s]) for n, digit in enumerate(digits) for s in DIGITS[int(digit)]]
+    first = STEP * np.array([n for n, _ in strokes])[:, None]
+    left, end, low, high = np.array([stroke for _, stroke in strokes]).T
+    across = (np.stack([left, end, end, left], axis=1) + first - wide / 2).reshape(-1, 1)
+    over = (np.stack([low, low, high, high], axis=1) - 0.5).reshape(-1, 1)
+    return np.asarray(at + size * (across * right + over * up))
 
 
 def add_robots(

@@ -19,7 +19,7 @@ from factory.floor.layout.crossings import near as near_boxes
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.presence import ACROSS, ALONG, ANY, ROUNDING, Presence
 from factory.floor.mating.depth import rough, spanned
-from factory.support.arrays import Array, Index, Indices
+from factory.support.arrays import Array, Index, Indices, Truth
 
 BLOCK = 1 << 14
 """Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of
@@ -60,7 +60,7 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
     count = np.array([len(presence.boxes) for presence in presences])
     low, high = hulls[:, 0] - clearance / 2, hulls[:, 1] + clearance / 2
     for first, second in near_boxes(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])):
-        meets = (low[first] < high[second]).all(axis=1) & (low[second] < high[first]).all(axis=1)
+        meets = _all((low[first] < high[second]) & (low[second] < high[first]))
         meets &= machine[first] != machine[second]
         pairs = np.stack([first[meets], second[meets]], axis=1)
         if not len(pairs):
@@ -103,8 +103,10 @@ class _Boxes:
         for pair, one, other in _combined(here, there, len(pairs)):
             lacking = _overlap(self._boxes[one], self._boxes[other])
             lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
+            meets = lacking > ROUNDING
+            pair, one, other = pair[meets], one[meets], other[meets]
+            lacking = lacking[meets]
             order = np.lexsort((other, one, lacking, pair))
-            order = order[lacking[order] > ROUNDING]
             is_last = np.append(np.diff(pair[order]) > 0, True)[: len(order)]
             for n in order[is_last].tolist():
                 mine, others = both[pair[n]]
@@ -117,7 +119,7 @@ class _Boxes:
         pair, box = _spans(self._first[which], self._count[which])
         low, high = (hulls[:, 0] - apart[:, None])[pair], (hulls[:, 1] + apart[:, None])[pair]
         boxes = self._boxes[box]
-        meets = ((boxes[:, 0] < high) & (boxes[:, 1] > low)).all(axis=1)
+        meets = _all((boxes[:, 0] < high) & (boxes[:, 1] > low))
         return pair[meets], box[meets]
 
 
@@ -229,10 +231,16 @@ def meeting(one: Presence, other: Presence, needed: Distances) -> Meeting:
 def _overlap(one: Array, other: Array) -> Array:
     """Depth of overlap of boxes (..., 2, 3); negative: their distance (...) [m]."""
     low = np.maximum(one[..., 0, :], other[..., 0, :])
-    return np.asarray((np.minimum(one[..., 1, :], other[..., 1, :]) - low).min(axis=-1))
+    x, y, z = np.moveaxis(np.minimum(one[..., 1, :], other[..., 1, :]) - low, -1, 0)
+    return np.asarray(np.minimum(np.minimum(x, y), z))
+
+
+def _all(meets: Truth) -> Truth:
+    """Whether boxes meet (n,) that do along each axis (n, 3)."""
+    return np.asarray(meets[:, 0] & meets[:, 1] & meets[:, 2])
 
 
 def _within(boxes: Array, hull: Array, apart: float) -> Index:
     """Which boxes (n, 2, 3) come nearer than a distance to a box (2, 3)."""
     meets = (boxes[:, 0] < hull[1] + apart) & (boxes[:, 1] > hull[0] - apart)
-    return np.flatnonzero(meets.all(axis=1))
+    return np.flatnonzero(_all(meets))

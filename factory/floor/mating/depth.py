@@ -48,6 +48,7 @@ class Polytope:
     normals: Array = field(repr=False)
     edges: Array = field(repr=False)
     """(e, 3, 3): of each edge its direction and the normals of the faces on both sides."""
+    is_upright_box: bool = field(default=False, repr=False)
 
     @cached_property
     def reach(self) -> Array:
@@ -82,7 +83,8 @@ def polytope(vertices: Array) -> Polytope:
 def upright_box(low: Array, high: Array) -> Polytope:
     """The box along the axes with corners `low` and `high` (3,), without a search for its hull."""
     corners = np.where(CORNERS, high, low)
-    return Polytope(corners, BOX_NORMALS, BOX_EDGES * [high - low, np.ones(3), np.ones(3)])
+    edges = BOX_EDGES * [high - low, np.ones(3), np.ones(3)]
+    return Polytope(corners, BOX_NORMALS, edges, is_upright_box=True)
 
 
 def _support(normals: Array, vertices: Array) -> Array:
@@ -119,7 +121,10 @@ def exact(p: Polytope, q: Polytope) -> Difference:
 
 
 def spanned(p: Polytope, q: Polytope) -> Difference:
-    """The half-spaces that an edge of each spans."""
+    """The half-spaces that an edge of each spans, but for those of upright boxes, which are those
+    of their faces."""
+    if p.is_upright_box and q.is_upright_box:
+        return Difference(np.zeros((0, 3)), np.zeros(0))
     normals = _spanned(p.edges, q.edges)
     return Difference(normals, _support(normals, p.vertices) + _support(-normals, q.vertices))
 

@@ -174,9 +174,11 @@ class Hands:
         return self._chosen[tours, frames]
 
     def _settle(self, tours: tuple[int, ...]) -> None:
-        """Choose the hands of all carriers above some tours, the uppermost first, so that the
-        choice never recurses, however deep the product."""
-        above, todo = list[int](), [*tours]
+        """Choose the hands of all carriers above the carriers of some tours, the uppermost first,
+        so that the choice recurses once, however deep the product; those carriers' own depend on
+        where their guests come from, and are chosen when they are asked for."""
+        carriers = dict.fromkeys(self.holding.on[tour] for tour in tours)
+        above, todo = list[int](), [t for c in carriers if c >= 0 for t in self._on[c]]
         while todo:
             carrier = self.holding.on[todo.pop()]
             if carrier >= 0 and self._on[carrier] not in self._settled:
