@@ -167,7 +167,7 @@ class ArmPlanner:
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
         placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto))
         at, under = self._spared_at(label), self._spared_under(label)
-        spared = (at | under) - (self._moving - (at & under))
+        spared = (at & under) | ((at | under) - self._moving)  # parts count that do at either end
 
         def clearance(q: Array) -> tuple[Array, Index]:
             return self.scene.margins(q, "", CERTAIN_AT_END, spared)

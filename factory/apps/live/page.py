@@ -29,7 +29,7 @@ SCRIPTS = (
 """In the order in which they run."""
 
 SAMPLES = 24
-"""Each way of a robot that moves several joints is looked at in so many places."""
+"""Number of positions at which each way of a robot that moves several joints is sampled."""
 
 
 def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
@@ -99,10 +99,9 @@ def _reach(simulation: Simulation) -> Array:
     layout, world = simulation.layout, simulation.physical
     m, (at, _) = world.m, world.motion.axes.measured(world.d)
     reach = np.stack([world.d.xpos] * 2)
-    chains = layout.chains.robots if layout.chains else ()
     for robot in layout.factory.robots:
         body, path = m.body(names.carriage(robot.name)).id, layout.guidepaths[robot.index]
-        if robot.index in chains:
+        if robot.body.first.moves:  # several joints
             bodies = np.flatnonzero(m.body_rootid == m.body_rootid[body])
             places = np.array([every[bodies] for every in _along(simulation, robot.index)])
             reach[:, bodies] = places.min(axis=0), places.max(axis=0)
@@ -132,13 +131,11 @@ def _along(simulation: Simulation, robot: int) -> Iterator[Array]:
 
 
 def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Array]]:
-    """The state of the engine with the robots of an operation where it ends."""
+    """The state of the engine with the carrier of an operation where that ends."""
     layout, world = simulation.layout, simulation.physical
     axes = world.motion.axes.apart()
     for operation in layout.factory.operations:
-        qpos, at = world.d.qpos.copy(), layout.visits
-        stops = np.array([at[operation.index, robot].at for robot in operation.robots])
-        for robot in operation.robots:
-            axes.curves.take(robot, operation.index)
-        axes.configure(qpos, np.array(operation.robots), stops)
+        qpos, carrier = world.d.qpos.copy(), operation.carrier
+        stop = layout.visits[operation.index, carrier].at
+        axes.configure(qpos, np.array([carrier]), np.array([stop]))
         yield operation, qpos

@@ -132,7 +132,7 @@ def _height_in(near: Array, low: Corner, high: Corner) -> float:
     where edges cross its sides."""
     corners = near.reshape(-1, 3)
     top = _highest(corners, low, high)
-    near = near[near[..., 2].max(axis=1, initial=-np.inf) > top]
+    near = near[near[..., 2].max(axis=1) > top]
     if not len(near):
         return top
     points = [_over_corners(near, low, high)]

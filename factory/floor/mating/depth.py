@@ -48,7 +48,11 @@ class Polytope:
     normals: Array = field(repr=False)
     edges: Array = field(repr=False)
     """(e, 3, 3): of each edge its direction and the normals of the faces on both sides."""
-    is_upright_box: bool = field(default=False, repr=False)
+
+    @property
+    def is_upright_box(self) -> bool:
+        """Whether it was made by `upright_box`."""
+        return self.normals is BOX_NORMALS
 
     @cached_property
     def reach(self) -> Array:
@@ -83,8 +87,7 @@ def polytope(vertices: Array) -> Polytope:
 def upright_box(low: Array, high: Array) -> Polytope:
     """The box along the axes with corners `low` and `high` (3,), without a search for its hull."""
     corners = np.where(CORNERS, high, low)
-    edges = BOX_EDGES * [high - low, np.ones(3), np.ones(3)]
-    return Polytope(corners, BOX_NORMALS, edges, is_upright_box=True)
+    return Polytope(corners, BOX_NORMALS, BOX_EDGES * [high - low, np.ones(3), np.ones(3)])
 
 
 def _support(normals: Array, vertices: Array) -> Array:

@@ -30,15 +30,12 @@ def small(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_log_is_judged_shown_and_continued(own: Path, tmp_path: Path, run: Terminal) -> None:
-    """By commands that know its file only; the PAG is gone, and so is the arm, which is a user's,
-    with its meshes, and with what it leaves out of contact."""
-    file, log, page = (tmp_path / f"box.{kind}" for kind in ("pag", "log", "html"))
-    file.write_text(BOX)
-    cut = run("run", file, "--arm", own, "--units", "2", "--max-time", "4", "--log", log)
+def test_a_log_is_judged_shown_and_continued(small: Path, tmp_path: Path, run: Terminal) -> None:
+    """By commands that know its file only; the PAG is gone."""
+    log, page = tmp_path / "small.log", tmp_path / "small.html"
+    cut = run("run", small, "--arm", "six", "--units", "2", "--max-time", "9", "--log", log)
     assert cut.status == 1
-    for path in (file, own, tmp_path / "shapes" / "link.stl"):
-        path.unlink()
+    small.unlink()
     done = run("run", log, "--resume", "--json")
     assert done.status == 0, done.err
     judged = run("monitor", log, "--json")
@@ -47,8 +44,20 @@ def test_a_log_is_judged_shown_and_continued(own: Path, tmp_path: Path, run: Ter
     shown = run("report", log, "-o", page, "--json")
     assert shown.status == 0 and shown.json["predicted"] and shown.json["products"] == 2
     assert ">r2</text>" in page.read_text()
-    still = run("render", log, "-o", tmp_path / "box.png", "--at", "3", "--size", "160x90")
+    still = run("render", log, "-o", tmp_path / "small.png", "--at", "3", "--size", "160x90")
     assert still.status == 0
+
+
+def test_an_arm_of_a_user_is_in_the_log(own: Path, tmp_path: Path, run: Terminal) -> None:
+    """With its meshes, and with what it leaves out of contact."""
+    file, log = tmp_path / "box.pag", tmp_path / "box.log"
+    file.write_text(BOX)
+    done = run("run", file, "--arm", own, "--units", "1", "--log", log, "--json")
+    assert done.status == 0, done.err
+    for path in (own, tmp_path / "shapes" / "link.stl"):
+        path.unlink()
+    judged = run("monitor", log, "--json")
+    assert judged.status == 0 and judged.json["verdict"]["succeeded"], judged.err
 
 
 def test_what_a_log_says_of_its_arms_is_not_trusted(small: Path, tmp_path: Path) -> None:

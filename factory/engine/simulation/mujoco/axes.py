@@ -102,8 +102,7 @@ class Axes:
             curves.at[rows] = x[which]
 
     def apart(self) -> Axes:
-        """The same axes for other data of the engine: which curves they follow there, and how far,
-        is nothing to these."""
+        """A copy for other data of the engine, which follows curves of its own."""
         return replace(self, curves=self.curves.apart())
 
     def off(self, d: mujoco.MjData, x: Array) -> Array:

@@ -65,7 +65,7 @@ class Curves:
             self.now[self.row[robot]] = self.chains.row(operation, robot)
 
     def apart(self) -> Curves:
-        """The same curves; which are followed, and how far, is nothing to these."""
+        """A copy with its own state: the curves that are followed, and the coordinates on them."""
         return replace(self, now=self.now.copy(), at=self.at.copy(), latest={})
 
     def among(self, axes: Index) -> tuple[Index, Index]:
