@@ -474,6 +474,7 @@ def test_what_is_written_checks_and_runs_as_it_is(run: Terminal, tmp_path: Path)
     assert done.json["parts"] == 5
     assert done.json["kinds"] == 2
     assert {"pag", "notes", "approaches", "files", "warnings"} <= {*done.json}
+    assert done.out.count("\n") == 1
     assert sorted(files_in(out)) == ["meshes/leg-1.obj", "meshes/top.obj", "my-table.pag"]
     pag = out / "my-table.pag"
     again = run("plan", parts, "-o", tmp_path / "again", "--no-look", "--json")
