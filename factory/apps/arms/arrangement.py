@@ -6,11 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import asin, cos, pi, sin
+from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, RunError, Solid
+from factory.api import Array, Diagnostic, Operation, RunError, Solid
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.cell import Well, well_of
@@ -88,14 +88,37 @@ class Arrangement(Handling):
         lines = dict[int, Line]()
         for carrier, draft in self.drafts.items():
             if carrier:
-                lines[carrier] = self._beside(draft, [*map(_behind, lines.values())])
+                line = self._beside(draft, [*map(_behind, lines.values())])
             else:
-                lines[carrier] = replace(draft, station=self.station, ahead=self.lane)
+                line = replace(draft, station=self.station, ahead=self.lane)
+            steps = self._steps(line)
+            ahead = max(line.ahead, *steps.values(), 0.0)
+            lines[carrier] = replace(line, steps=steps, ahead=ahead)
         return lines
+
+    def _steps(self, line: Line) -> dict[int, float]:
+        """`Line.steps`: where the circle of an arm whose tool comes to one distance crosses the
+        line. Raises RunError (Unreachable) where it does not."""
+        steps = dict[int, float]()
+        if not self.ring.is_circle:
+            return steps
+        for label, burden in self.burdens.items():
+            stops = {burden.onto: burden.join, burden.source: self.factory.by_label[label]}
+            if line.carrier in stops:
+                place = self.tip[label][:2] - self.product.middle[:2] + line.station
+                x, y = (place - self.stands[self.arm_of[label]].place[:2]).tolist()
+                if abs(y) >= self.ring.outer:
+                    message = f"'{label}' is {1e3 * abs(y):.0f} mm from the axis of its arm, across"
+                    message += f" the line of {line.name}; its tool comes to"
+                    message += f" {1e3 * self.ring.outer:.0f} mm"
+                    raise RunError(Diagnostic("Unreachable", message, burden.join.position, RAILS))
+                along = copysign(sqrt(self.ring.outer**2 - y**2), x)
+                steps[stops[line.carrier].index] = along - x
+        return steps
 
     def _beside(self, line: Line, taken: Sequence[Box]) -> Line:
         """A line where it is clear of others."""
-        stand, radius = self.stands[self.arms[0]], self.near + CLOSER
+        stand, radius = self.stands[self.arms[0]], self.round
         taken = [*taken, pedestal(stand)]
         for angle in np.arange(TURN, FULL, TURN).tolist():
             x, y, _ = stand.place
@@ -138,6 +161,11 @@ class Arrangement(Handling):
         """Distance of the station from an arm's axis [m]."""
         return self.ring.at(self.far)
 
+    @property
+    def round(self) -> float:
+        """Distance of the feeders from an arm's axis [m]."""
+        return self.ring.outer if self.ring.is_circle else self.near + CLOSER
+
     @cached_property
     def stands(self) -> dict[int, Stand]:
         """Where the arms stand, to the left and right of the line in turn."""
@@ -145,6 +173,8 @@ class Arrangement(Handling):
             message = f"{len(self.arms)} arms have no room at one station"
             raise RunError(Diagnostic("Layout", message, None, f"at most {len(SIDES)}"))
         (x, y), off = self.station, self.near
+        if self.ring.is_circle:
+            x -= sqrt(self.round**2 - off**2)
         return {
             arm: Stand((x, y + side * off, self.ring.base), -side * pi / 2, self.pad)
             for arm, side in zip(self.arms, SIDES, strict=False)
@@ -159,7 +189,7 @@ class Arrangement(Handling):
         """The feeders of an arm: on a circle round it, the first ones next to the carrier's line;
         to the right and left of the station in turn, but with another arm opposite to the right as
         long as there is room: so the ways of both cross at the station alone."""
-        stand, radius = self.stands[arm], self.near + CLOSER
+        stand, radius = self.stands[arm], self.round
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.clearance
         angles, taken = [0.0, 0.0], [*map(_behind, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
@@ -185,7 +215,7 @@ class Arrangement(Handling):
     def _anywhere(self, solid: Solid, stand: Stand, first: float, taken: Sequence[Box]) -> Well:
         """The feeder of a part where one has room, on circles round an arm. Raises RunError
         (Layout)."""
-        circles = np.linspace(self.near + CLOSER, self.ring.outer, CIRCLES)
+        circles = np.linspace(self.round, self.ring.outer, CIRCLES)
         for radius in circles.tolist():
             for angle in np.arange(first, FULL, TURN).tolist():
                 for turned in (angle, -angle):
@@ -207,6 +237,9 @@ class Arrangement(Handling):
         x, y, _ = stand.place
         turned = stand.yaw + angle
         at = x + radius * cos(turned), y + radius * sin(turned)
+        if self.ring.is_circle:  # the tool comes there, which is not in the part's middle
+            u, v = (self.tip_shown(solid.label) - (solid.low + solid.high) / 2)[:2].tolist()
+            at = at[0] - u, at[1] - v
         return well_of(solid, at, self.product, self.show, self.clearance)
 
     @property
@@ -219,14 +252,14 @@ class Arrangement(Handling):
         """How far from its place in the product's frame what an arm brings is as the arm takes it
         (3,) [m]."""
         if (source := self.burdens[label].source) is not None:
-            return self.placed(source)
+            return self.placed(source, self.factory.by_label[label])
         well = self.wells[label]
         return np.array([*well.place, well.elevation]) - self._foot
 
-    def placed(self, carrier: int) -> Array:
-        """How far a part is from its place in the product's frame at the station of a line
-        (3,) [m]."""
-        return np.array([*self.lines[carrier].station, 0.0]) - self._foot
+    def placed(self, carrier: int, operation: Operation | None = None) -> Array:
+        """How far a part is from its place in the product's frame where a carrier stands in an
+        operation, or else at the station of its line (3,) [m]."""
+        return np.array([*self.lines[carrier].stand(operation), 0.0]) - self._foot
 
     def local(self, arm: int, place: Array) -> Array:
         """A place of the world in the frame of an arm's base (3,) [m]."""

@@ -175,10 +175,19 @@ class SoughtLegs:
 
     def _nearest(self, arm: int, q: Array) -> tuple[Leg, float, float]:
         """The leg of an arm that is nearest to a configuration (n,), the coordinate of its way
-        there [m], and how far it is [rad, m]."""
-        grid, s = self._grids[arm]
+        there [m], and how far it is [rad, m]: of those that have a place of the grid so near that
+        they may be."""
+        (grid, s), legs = self._grids[arm], self.legs[arm]
         off = np.linalg.norm(grid - q, axis=-1)
-        row, at = np.unravel_index(int(off.argmin()), off.shape)
-        leg = self.legs[arm][int(row)]
-        (near,), (apart,) = leg.way.nearest(q[None], s[row, at : at + 1])
-        return leg, float(near), float(apart)
+        at, least = off.argmin(axis=1), off.min(axis=1)
+        sought = list[tuple[float, int, float]]()
+        for row in np.flatnonzero(least <= least.min() + self._gaps[arm] / 2).tolist():
+            (near,), (apart,) = legs[row].way.nearest(q[None], s[row, at[row], None])
+            sought.append((float(apart), row, float(near)))
+        apart, row, near = min(sought)
+        return legs[row], near, apart
+
+    @cached_property
+    def _gaps(self) -> list[float]:
+        """The greatest distances of neighbours in these grids [rad, m]."""
+        return [float(np.linalg.norm(np.diff(g, axis=1), axis=-1).max()) for g, _ in self._grids]

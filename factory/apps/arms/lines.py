@@ -8,8 +8,8 @@ sub-assembly ends there, where an arm takes it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from factory.api import Array, Factory, Guidepath, Layout, Operation, Product
@@ -53,6 +53,8 @@ class Line:
         tools: those that work on what the carrier brings.
         station: of the arms [m].
         ahead: from there to the end of the line [m].
+        steps: by operation (index) of an arm, how much further ahead than at the station the
+            carrier stands for it [m]; nothing where it stands there for all.
     """
 
     factory: Factory
@@ -62,6 +64,7 @@ class Line:
     tools: tuple[Tool, ...]
     station: Point2 = (0.0, 0.0)
     ahead: float = 0.0
+    steps: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -100,6 +103,11 @@ class Line:
         back = (self.station[0] - self.box_of(tool)[0] for tool in self.tools)
         return round(max([LANE, *back]) + self.length, 3)
 
+    def stand(self, operation: Operation | None) -> Point2:
+        """Where the product's middle is in an operation of an arm, or else at the station [m]."""
+        step = 0.0 if operation is None else self.steps.get(operation.index, 0.0)
+        return self.station[0] + step, self.station[1]
+
     @cached_property
     def path(self) -> Guidepath:
         """The carrier's guidepath."""
@@ -133,7 +141,7 @@ class Line:
     def stop(self, operation: Operation) -> float:
         """How far from its feeder the carrier stands in an operation [m]."""
         at = next((t.ahead for t in self.tools if t.robot in operation.robots), 0.0)
-        return round(self.behind + at, 6)
+        return round(self.behind + at, 6) + self.steps.get(operation.index, 0.0)
 
     def regions_of(self, tool: Tool) -> Iterator[Region]:
         """The floor that a tool takes."""

@@ -96,8 +96,10 @@ def orders_of(
     for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
         (one, left), (other, _) = (of[brought[o.index]] for o in (before, after))
         if one != other:
-            past = gone(before, private[left.label].leaves)
-            yield Away(past, after.index, int(after is joins[0]))
+            leaves = private[left.label].leaves
+            if cell.lines[after.carrier].steps:  # the carrier goes on under it
+                leaves = max(leaves, next_tour(tours[one], left.label).goes.off)
+            yield Away(gone(before, leaves), after.index, int(after is joins[0]))
     for carrier in cell.lines:
         gear = [factory.operations[number] for number in factory.robots[carrier].operations]
         for join, then in pairwise(gear):

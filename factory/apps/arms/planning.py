@@ -3,14 +3,14 @@ and places them, and its ways between these."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import pi
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Index, Layout, RunError, mujoco
+from factory.api import Array, Diagnostic, Index, Layout, Operation, RunError, mujoco
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM, standing
@@ -124,6 +124,13 @@ class ArmPlanner:
             )
         return tours
 
+    def _have(self, operations: Mapping[int | None, Operation]) -> None:
+        """Have carriers stand where they do in operations, by their indices."""
+        for carrier, line in self.cell.lines.items():
+            x, y = line.stand(operations.get(carrier))
+            parts = {placed_name(part, line) for part in line.rails.product.solids}
+            self.scene.move(parts, (x - line.station[0], y - line.station[1], 0.0))
+
     def _hold(self, label: str, yaw: float) -> None:
         """Hold a part with the tool at an angle [rad]."""
         m, turn = self.scene.m, np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
@@ -165,7 +172,8 @@ class ArmPlanner:
         taken = np.array([down(float(a) + burden.fed - yaw) for a in angles])
         turns = np.array([down(float(a) - yaw) for a in angles])
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
-        placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto))
+        placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto, burden.join))
+        self._have({burden.onto: burden.join, burden.source: cell.factory.by_label[label]})
         at, under = self._spared_at(label), self._spared_under(label)
         spared = (at & under) | ((at | under) - self._moving)  # parts count that do at either end
 
@@ -246,6 +254,8 @@ class ArmPlanner:
     ) -> JointWay:
         """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
         scene, every = self.scene, self._moving
+        after_, before_ = self.cell.burdens[after], self.cell.burdens[before]
+        self._have({before_.onto: before_.join, after_.source: self.cell.factory.by_label[after]})
         taken, pile = self._spared_at(after, bool(label)), self._spared_under(before)
         first, last = (taken, pile) if label else (pile, taken)
         way = leg(

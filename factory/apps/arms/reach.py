@@ -15,6 +15,7 @@ from factory.apps.arms.inverse import (
     descend,
     least_singular_value,
     nearest_in_range,
+    seeds,
     solutions,
 )
 
@@ -118,6 +119,17 @@ def _farthest(chain: SerialChain, places: Array, turn: Array, q: Array) -> tuple
     return reached, rows.reshape(len(places), len(q), -1)[reached - 1][good[reached - 1]]
 
 
+ROUND = 1e-9
+"""Distances that differ by less are one [m]."""
+
+
+def circle_of(chain: SerialChain) -> float | None:
+    """The radius of the circle about the axis of its base on which an arm's tool stays [m], as that
+    of one hinge with a slide and a wrist does; None where it does not."""
+    distances = np.hypot(*chain.tool(seeds(chain))[0][:, :2].T)
+    return float(distances.mean()) if np.ptp(distances) < ROUND else None
+
+
 BASES = (0.10, 0.14, 0.18, 0.22, 0.26, 0.30, 0.36, 0.42, 0.48)
 """Heights at which the base of an arm may stand [m]."""
 
@@ -144,10 +156,18 @@ class Ring:
     outer: float
     spread: float = 0.0
 
+    @property
+    def is_circle(self) -> bool:
+        """Whether the arm comes to one distance only."""
+        return self.inner == self.outer
+
     def at(self, share: float) -> float:
         """The distance from its axis at a share of the ring's width, from where all places about it
-        are in the ring, if that is wide enough [m]."""
+        are in the ring, if that is wide enough; of a line that crosses the ring of an arm that
+        comes to one distance only [m]."""
         width = self.outer - self.inner
+        if self.is_circle:
+            return self.outer * (1.0 - share / 2)
         spread = min(self.spread, width / 2)
         return self.inner + min(max(share * width, spread), width - spread)
 
@@ -162,7 +182,8 @@ def ring_of(chain: SerialChain, low: float, high: float, spread: float = 0.0) ->
         high: greatest height [m].
         spread: how far from the station it places parts [m].
     """
-    radii = np.arange(STEP, chain.length, STEP)
+    circle = circle_of(chain)
+    radii = np.arange(STEP, chain.length, STEP) if circle is None else np.array([circle])
     turn = np.diag([1.0, -1.0, -1.0])
     best: Ring | None = None
     for base in BASES:
@@ -177,6 +198,8 @@ def ring_of(chain: SerialChain, low: float, high: float, spread: float = 0.0) ->
             ]
         inner, outer = _longest(reached)
         ring = Ring(base, float(radii[inner]), float(radii[outer]), spread)
+        if circle is not None and reached.all():
+            return ring
         if outer > inner and (best is None or ring.outer - ring.inner > best.outer - best.inner):
             best = ring
         if best is not None and best.outer - best.inner > ENOUGH + 2 * spread:

@@ -104,7 +104,7 @@ class Scene:
             for g in range(m.ngeom)
             if solid[g] and m.body_weldid[m.geom_bodyid[g]] == 0 and m.geom_bodyid[g] != 0
         ]
-        self._own = self._pairs()
+        self._own, self._stand = self._pairs(), m.geom_pos.copy()
 
     def _pairs(self) -> list[tuple[int, int]]:
         """The pairs of links that may touch: those with two joints or more between them."""
@@ -123,6 +123,11 @@ class Scene:
     def _depth(self) -> list[int]:
         """Number of joints that move each geom."""
         return [len(joints_of(self.m, int(body))) for body in self.m.geom_bodyid]
+
+    def move(self, names: Collection[str], by: tuple[float, float, float]) -> None:
+        """Move obstacles from where they stood first [m]."""
+        moved = [g for g in self.still if self._called(g) in names]
+        self.m.geom_pos[moved] = self._stand[moved] + by
 
     def say(self, pair: int) -> str:
         """What a pair of geoms is, in words."""

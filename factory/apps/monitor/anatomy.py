@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.api import Array, Factory, Index, names
-from factory.engine.mjcf.weld_frames import HINGE, SHALLOW, SLIDE, WeldFrames, joints_of
+from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames, chain_of
 from factory.floor.layout.chains import SoughtCurves
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     upright = abs(m.jnt_axis[first, 2]) == 1.0
     turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
     for body in np.unique(m.eq_obj1id[welds]):
-        if len(joints_of(m, int(body))) > SHALLOW:
+        if chain_of(m, int(body)):
             continue
         if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")

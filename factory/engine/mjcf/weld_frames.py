@@ -78,8 +78,8 @@ class WeldFrames:
     def _chained(self, m: mujoco.MjModel, d: mujoco.MjData, held: Array, turn: Array) -> WeldFrames:
         """The same with the welds of holders at the end of longer chains, which are at `held`
         (n, 3), turned by `turn` (n, 4) now."""
-        chains = {int(b): joints_of(m, int(b)) for b in np.unique(m.eq_obj1id)}
-        deep = np.array([len(chains[int(b)]) > SHALLOW for b in m.eq_obj1id], bool)
+        chains = {int(b): chain_of(m, int(b)) for b in np.unique(m.eq_obj1id)}
+        deep = np.array([bool(chains[int(b)]) for b in m.eq_obj1id], bool)
         if not deep.any():
             return self
         most = max(self.along.shape[1], *(len(chain) for chain in chains.values()))
@@ -165,6 +165,16 @@ def joints_of(m: mujoco.MjModel, body: int) -> list[int]:
         joints = [*range(first, first + count), *joints]
         body = int(m.body_parentid[body])
     return [j for j in joints if m.jnt_type[j] in (SLIDE, HINGE)]
+
+
+def chain_of(m: mujoco.MjModel, body: int) -> list[int]:
+    """The joints of a holder at the end of a chain, from the base on; none of one that slides, on
+    what slides, or turns about the vertical there."""
+    joints = joints_of(m, body)
+    hinges = [j for j in joints if m.jnt_type[j] == HINGE]
+    upright = all(j == joints[-1] and abs(m.jnt_axis[j, 2]) == 1.0 for j in hinges)
+    few = len(joints) <= SHALLOW and len({*m.jnt_bodyid[joints].tolist()}) <= 2
+    return [] if few and upright else joints
 
 
 def held_at(m: mujoco.MjModel, welds: Index, xpos: Array, xmat: Array) -> Array:

@@ -1,0 +1,89 @@
+"""An arm whose tool stays on a circle, of a slide, a hinge and a wrist: `examples/cells/swing.xml`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from unittest.mock import patch
+
+import numpy as np
+import pytest
+
+from factory.apps.arms import laying
+from factory.apps.arms.orders import PrivateParts, private_parts
+from factory.apps.arms.reach import circle_of
+from tests.arm_cells import SMALL, cell, chains, project, refusal, run
+from tests.arm_models import shipped
+from tests.paths import EXAMPLES
+
+SWING = str(EXAMPLES / "cells" / "swing.xml")
+
+RADIUS = 0.28
+"""Of its circle [m]."""
+
+
+def test_the_carrier_stands_where_the_circle_crosses_its_line() -> None:
+    """For each part elsewhere, and the tool takes and places all on the circle."""
+    layout = cell(SWING)
+    assert circle_of(chains(layout).model.chain) == pytest.approx(RADIUS)
+    assert circle_of(shipped("scara")) is None
+    joins = [o for o in layout.factory.making if len(o.inputs) == 2]
+    stops = [layout.visits[o.index, o.carrier].at for o in joins]
+    assert abs(stops[1] - stops[0]) > 0.003
+    for leg in chains(layout).curves.legs:
+        places, _ = leg.chain.tool(leg.way.at(np.array([0.0, leg.way.length]))[0])
+        assert np.hypot(*places[:, :2].T) == pytest.approx(RADIUS, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arm", "units"),
+    [(SWING, 3), *(pytest.param(f"{SWING}{n}", 20, marks=pytest.mark.slow) for n in ("", "=2"))],
+)
+def test_it_makes_products(arm: str, units: int) -> None:
+    made = run(cell(arm), units=units, jitter=0.3, seed=5)
+    assert made.succeeded and made.refines_net and made.products == units
+    physics = made.physics
+    assert physics is not None and physics.unintended_contacts == 0 and physics.pairs > 0
+    assert 0.0 < physics.handoff_gap_max_mm <= 0.05
+    if made.cycle_time_s:
+        assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_carrier_goes_on_when_an_arm_is_up() -> None:
+    """It stands elsewhere for the next part, however soon the arms are clear of each other."""
+    with patch.object(laying, "private_parts", lambda *_: soon(private_parts(*_))):
+        layout = project(SMALL, f"{SWING}=2").layout
+    assert layout.certificate is not None
+    ups = [(leg.reach, leg.way.off) for leg in chains(layout).curves.legs if not leg.brings]
+    for past in layout.certificate.apart.passes:
+        assert any(abs(past.at - reach - off) < 0.01 for reach, off in ups)
+
+
+def soon(private: dict[str, PrivateParts]) -> dict[str, PrivateParts]:
+    """The same, but for arms that are clear of each other as they leave."""
+    return {label: replace(part, leaves=0.0) for label, part in private.items()}
+
+
+def test_where_it_is_on_its_legs_is_found_though_they_cross() -> None:
+    """The nearest of some places on each leg may lie on another than the arm is on."""
+    sought, rng = chains(cell(SWING)).sought, np.random.default_rng(1)
+    for leg in sought.legs[0]:
+        for x in rng.uniform(0.0, leg.way.length, (400, 1)):
+            assert sought.apart(leg.way.at(x)[0])[0] < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (SMALL.replace("(-0.018, 0.01, 0.0421)", "(-0.018, 0.3, 0.0421)"), "across the line"),
+        (
+            SMALL.replace(
+                "(0.10, 0.07, 0.03), pos = (0, 0, 0.015)", "(0.10, 0.07, 0.2), pos = (0, 0, -0.07)"
+            ),
+            "mm up",
+        ),
+    ],
+)
+def test_what_it_cannot_place_is_refused(text: str, said: str) -> None:
+    why = refusal(text, SWING)
+    assert why.code == "Unreachable" and said in why.message and "rails" in why.hint
