@@ -29,7 +29,7 @@ from factory.theory.problem.robot_reader import read_body
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs" / "guide" / "extending.md").read_text("utf-8")
-SECTION = PAGE.partition("### A gripper with fingers")[2].partition("\n## ")[0]
+SECTION = PAGE.partition("### A gripper with fingers")[2].partition("\n##")[0]
 JAWS, DRIVES, CATALOGUE, CLASP, PRODUCT = re.findall(
     r"^```(?:xml|toml|text)\n(.*?)^```$", SECTION, re.M | re.S
 )

@@ -1,9 +1,10 @@
-"""An arm whose tool stays on a circle, of a slide, a hinge and a wrist: `examples/cells/swing.xml`."""
+"""An arm whose tool stays on a circle: `examples/cells/swing.xml`, a slide, a hinge and a wrist."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from unittest.mock import patch
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from factory.apps.arms.orders import PrivateParts, private_parts
 from factory.apps.arms.reach import circle_of
 from tests.arm_cells import SMALL, cell, chains, project, refusal, run
 from tests.arm_models import shipped
-from tests.paths import EXAMPLES
+from tests.paths import EXAMPLES, ROOT
 
 SWING = str(EXAMPLES / "cells" / "swing.xml")
 
@@ -70,6 +71,22 @@ def test_where_it_is_on_its_legs_is_found_though_they_cross() -> None:
     for leg in sought.legs[0]:
         for x in rng.uniform(0.0, leg.way.length, (400, 1)):
             assert sought.apart(leg.way.at(x)[0])[0] < 1e-6
+
+
+def test_the_page_shows_its_joints() -> None:
+    page = (ROOT / "docs" / "guide" / "extending.md").read_text("utf-8")
+    shown = page.partition("### A machine with a hinge")[2].partition("```xml\n")[2]
+    bodies = ElementTree.fromstring(shown.partition("```")[0])
+    file = ElementTree.parse(SWING).getroot()
+    for name in ("body", "joint", "site"):
+        assert [e.attrib for e in bodies.iter(name)] == [
+            e.attrib
+            for e in file.find("worldbody").iter(name)  # type: ignore[union-attr]
+        ]
+    solid = [{**e.attrib} for e in file.iter("geom") if e.get("class") == "solid" and e.get("name")]
+    sizes = {e["name"]: (e["size"], e.get("pos")) for e in solid}
+    for one in bodies.iter("geom"):
+        assert sizes[one.attrib["name"]] == (one.get("size"), one.get("pos"))
 
 
 @pytest.mark.parametrize(
