@@ -68,16 +68,11 @@ def robot_type(model: ArmModel) -> RobotType:
 
 def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
     """The project in which some arms of a kind place all parts but the first, by turns. Raises
-    InputError (NoCell) for a mix, and for two arms with sub-assemblies."""
+    InputError (NoCell) for a mix, and where an arm would have nothing to do."""
     if project.pag.mix is not None:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
     made = _lowering(project, model)
-    piles = piles_of(made.pag)
-    if arms > 1 and piles:
-        message = f"'{piles[0]}' is a sub-assembly: one arm makes what has such"
-        hint = f"one arm: --arm {model.kind}; {RAILS}"
-        raise InputError(Diagnostic("NoCell", message, made.pag[piles[0]].position, hint))
     crew = tuple(_crew(made.compiled, model.kind, arms))
     return made.with_plan(Plan(turns=(crew,), lifts=frozenset()))
 
@@ -183,11 +178,25 @@ def _not_lowered(project: Project) -> list[tuple[str, str]]:
 
 def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
     """The robot (index) that does the tour of each robot of a factory: carriers and tools their
-    own, arms by turns what is placed."""
+    own, arms in equal shares, by turns, what is placed; the first all that has to do with
+    sub-assemblies, which are built where it stands. Raises InputError (NoCell) where nothing is
+    left for one."""
     others = [robot.index for robot in factory.robots if robot.type != kind]
     placing = [robot for robot in factory.robots if robot.type == kind]
     order = sorted(placing, key=lambda robot: factory.postorder[robot.operations[-1]])
-    turn = {robot.index: number % arms for number, robot in enumerate(order)}
+    ends = [[factory.operations[n] for n in robot.operations] for robot in order]
+    first = [bool(takes.inputs or joins.carrier) for takes, *_, joins in ends]
+    shares, last, turn = [sum(first), *[0] * (arms - 1)], -1, dict[int, int]()
+    for robot, is_first in zip(order, first, strict=True):
+        if not is_first:
+            last = min(range(arms), key=lambda arm: (shares[arm], arm == last))
+            shares[last] += 1
+        turn[robot.index] = last = 0 if is_first else last
+    if not all(shares):
+        message = (
+            f"{arms} arms: all that is placed has to do with sub-assemblies, which one arm does"
+        )
+        raise InputError(Diagnostic("NoCell", message, None, f"one arm: --arm {kind}; {RAILS}"))
     for robot in factory.robots:
         if robot.index in turn:
             yield len(others) + turn[robot.index]

@@ -26,8 +26,10 @@ from tests.command_line import Terminal, spawn
 ARMS = ("six", "six=2")
 
 SUBS = """root = x;
-x = mate ( y, z ); y = mate ( a, b ); z = mate ( c, d );
-a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
+x = mate ( a, z ); z = mate ( b, c );
+a = atomic ( box = (0.09, 0.06, 0.02), pos = (0, 0, 0.01) );
+b = atomic ( box = (0.04, 0.04, 0.02), pos = (0.01, 0, 0.0301) );
+c = atomic ( box = (0.03, 0.03, 0.02), pos = (0.01, 0, 0.0502) )"""
 MIX = """mix = x, y;
 x = mate ( a, b ); y = mate ( c, d ); a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
 
@@ -137,7 +139,7 @@ def test_options_that_no_cell_has_are_refused(
 @pytest.mark.parametrize(
     ("text", "arm", "code", "said", "line"),
     [
-        (SUBS, "six=2", "NoCell", "'z' is a sub-assembly: one arm", 2),
+        (SUBS, "six=2", "NoCell", "2 arms: all that is placed has to do with", None),
         (MIX, "six", "NoCell", "one product, not a mix", None),
     ],
 )

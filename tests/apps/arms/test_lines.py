@@ -81,6 +81,16 @@ def test_it_is_made_and_nothing_touches() -> None:
     assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
 
 
+def test_two_arms_share_what_is_placed() -> None:
+    """The first has all that sub-assemblies need; it takes turns with the other at the product."""
+    layout = project(ROOF, "six=2").layout
+    arms = [robot.index for robot in layout.factory.robots if robot.type == "six"]
+    assert [does(layout, arm) for arm in arms] == [["c", "s", "s/taken", "p"], ["d", "p/2"]]
+    made = run(layout, units=4, jitter=0.3, seed=3)
+    assert made.succeeded and made.products == 4
+    assert made.physics is not None and made.physics.unintended_contacts == 0
+
+
 def test_a_carrier_waits_until_the_arm_has_gone_to_leave_for_its_tool() -> None:
     """And for its feeder, from where the arm has taken what it brought."""
     layout = post()
