@@ -31,6 +31,9 @@ APART = 0.02
 FULL = pi - 0.1
 """Angle from the station up to which there are feeders on either side of an arm [rad]."""
 
+BOTH = 0.12
+"""How much farther from the station tools are where arms stand on both sides [m]."""
+
 TURN, CIRCLES = 0.04, 4
 """Between the angles that are tried for a feeder or a line [rad], and number of circles."""
 
@@ -78,7 +81,8 @@ class Arrangement(Handling):
             wide = max(float(np.linalg.norm((b.high - b.low)[:2])) for b in brought)
             others = [other for n, other in lines.items() if n != carrier]
             boxes = [box for other in others for box in (other.swept, *other.tool_boxes)]
-            lines[carrier] = line.with_tools(wide / 2 + APART, [*room, *boxes])
+            near = wide / 2 + APART + BOTH * (len(self.arms) > 1)
+            lines[carrier] = line.with_tools(near, [*room, *boxes])
         return lines
 
     @cached_property

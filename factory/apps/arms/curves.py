@@ -133,6 +133,10 @@ GRID = 200
 """Number of places on a leg from which the nearest is sought."""
 
 
+TOGETHER = 1e-3
+"""Ways that are nearer to each other run together [rad, m]."""
+
+
 @dataclass(frozen=True, eq=False)
 class SoughtLegs:
     """The legs of arms of which it is not known which they follow: each is on the nearest.
@@ -176,7 +180,8 @@ class SoughtLegs:
     def _nearest(self, arm: int, q: Array) -> tuple[Leg, float, float]:
         """The leg of an arm that is nearest to a configuration (n,), the coordinate of its way
         there [m], and how far it is [rad, m]: of those that have a place of the grid so near that
-        they may be."""
+        they may be. Where some run together it is on that with the nearest place of the grid, which
+        the ends of legs are."""
         (grid, s), legs = self._grids[arm], self.legs[arm]
         off = np.linalg.norm(grid - q, axis=-1)
         at, least = off.argmin(axis=1), off.min(axis=1)
@@ -184,8 +189,10 @@ class SoughtLegs:
         for row in np.flatnonzero(least <= least.min() + self._gaps[arm] / 2).tolist():
             (near,), (apart,) = legs[row].way.nearest(q[None], s[row, at[row], None])
             sought.append((float(apart), row, float(near)))
-        apart, row, near = min(sought)
-        return legs[row], near, apart
+        nearest = min(sought)[0]
+        together = (one for one in sought if one[0] < nearest + TOGETHER)
+        _, row, near = min(together, key=lambda one: least[one[1]])
+        return legs[row], near, nearest
 
     @cached_property
     def _gaps(self) -> list[float]:
