@@ -17,13 +17,13 @@ import pytest
 
 from factory.apps.log import LogWriter, read_log
 from factory.apps.log.blocks import Arrays, pack_rows, unpack_rows
+from factory.apps.log.checks import HEADER
 from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.reader import digest_of, header_in
 from factory.apps.log.writer import rows_of_a_block
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.resuming import Resumed
 from factory.engine.record.state import State
-from factory.engine.record.verdict import HEADER
 from factory.engine.simulation.compiled import Compiled, compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
