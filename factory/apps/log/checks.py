@@ -16,9 +16,9 @@ from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import check_kept_figures
 from factory.floor.layout.saved import LayoutTable
+from factory.support.bounds import WorldName
 from factory.support.settings import AUTO
 from factory.support.tables import LARGE
-from factory.theory.control.profile import World
 
 HEADER = "header"
 """The figure that is the digest of the header of a log."""
@@ -43,7 +43,7 @@ class LogHeader(ProjectTable):
     nv: int
     versions: Mapping[str, str]
     command: tuple[str, ...]
-    world: World
+    world: WorldName
     seed: int
     jitter: float
     units: int
