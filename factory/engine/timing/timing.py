@@ -205,9 +205,8 @@ class Timing:
         robot = self.factory.operations[leaf].carrier
         hand, sooner = layout.hand(robot), 0.0
         if hand is None or not (hand.first or hand.kind == "above"):
-            fastest = SpeedProfile(
-                self.settings.speed * (1 + self.jitter), self.settings.acceleration
-            )
+            speed = self.settings.speed * (1 + self.jitter)
+            fastest = SpeedProfile(speed, self.settings.acceleration)
             at = float(self.starts[leaf][self.factory.operations[leaf].robots.index(robot)])
             sooner = fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
         return up * tick, max(0, ceil(down - sooner / tick - ROUNDING)) * tick
