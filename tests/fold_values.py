@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
-from factory.apps.few_robots.folding import fold, folded, mismatch
+from factory.apps.few_robots.folding import Line, fold, folded, line_of, mismatch
 from factory.apps.few_robots.parallel import in_parallel
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.embedding import lay_out
@@ -18,7 +18,7 @@ from factory.pipeline import Project, all_templates
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.folding import Line, line_of, sides_of
+from factory.theory.compiler.folding import sides_of
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import marked
 from factory.theory.plant.approaches import Approach

@@ -350,6 +350,23 @@ def unexplained(house: House) -> Iterator[str]:
             yield f"{module.name}: no docstring"
 
 
+def unguided(house: House) -> Iterator[str]:
+    """Packages of the core of whose modules neither their docstring nor that of the package above
+    names one to begin with."""
+    core = {name for floor in FLOORS for room in floor for name in (room, room.partition(".")[0])}
+    for name, module in house.modules.items():
+        inside = [other for other in house.modules if other.startswith(f"{name}.")]
+        if not inside or module.room not in core:
+            continue
+        above = house.modules.get(name.rpartition(".")[0])
+        here = ast.get_docstring(module.tree) or ""
+        there = (above and ast.get_docstring(above.tree)) or ""
+        files = [f"{other.removeprefix(f'{name}.').replace('.', '/')}.py" for other in inside]
+        folder = name.rpartition(".")[2]
+        if not any(f"`{file}`" in here or f"`{folder}/{file}`" in there for file in files):
+            yield f"{name}: names no module to begin with"
+
+
 def clocks(house: House) -> Iterator[str]:
     """Test modules that import `time`: what they find must not depend on how busy a machine is."""
     for name, module in house.beside.items():

@@ -95,6 +95,7 @@ TIMES = ("swap", "max_time", "cycle", "seconds")
 """Times, whose least value is excluded [s]."""
 
 WorldName = Literal["mujoco", "ideal"]
+"""The worlds in which a factory runs."""
 
 WORLDS: tuple[WorldName, ...] = get_args(WorldName)
 

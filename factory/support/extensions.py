@@ -1,9 +1,9 @@
 """Extensions: operations, control laws, robot types and exporters of other packages, found by their
 entry points, or in folders of the user. Mistakes in them are told at the line of the user's file.
 
-An entry point of the group `factory.templates`, `factory.robots`, `factory.laws` or
-`factory.exporters` names a package with `*.op` files, a package with a `catalogue.toml`, a
-function, or a module.
+An entry point of the group `factory.templates`, `factory.robots`, `factory.laws`,
+`factory.exporters` or `factory.explanations` names a package with `*.op` files, a package with a
+`catalogue.toml`, a function, a module, or a folder with texts.
 """
 
 from __future__ import annotations

@@ -20,10 +20,10 @@ LOG = b"factory-log "
 
 MIB = 1 << 20
 
-TEXT, TABLE, NET, MESH, RECORD = 32 * MIB, MIB, 256 * MIB, 256 * MIB, 4096 * MIB
+TEXT, TABLE, NET, MESH = 32 * MIB, MIB, 256 * MIB, 256 * MIB
 """Upper bounds on the bytes of a file that is read: a text (PAG, operation, tree, bill, LDraw), a
-table in TOML, a net or a certificate, a mesh, a log. A text takes up to 150 times its bytes of
-memory, a net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
+table in TOML, a net or a certificate, a mesh. A text takes up to 150 times its bytes of memory, a
+net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
 
 
 PATIENCE = 2.0

@@ -77,7 +77,7 @@ class Settings:
             shapes that are smaller where they collide [m].
         force: limit of the actuators, as a multiple of what the payload needs.
         settle: time to come to rest within eps [s], used for predictions only.
-        outfeed: speed of the outfeed [m/s].
+        outfeed: speed of the outfeed's tray, and of the sliders of feeders [m/s].
         stage: 1 where robots that wait with empty hands go ahead to where their next operation
             needs them, else 0.
 

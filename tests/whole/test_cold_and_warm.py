@@ -29,6 +29,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from factory.apps.drawing import markup
 from factory.commands import places
 from factory.floor.geometry import meshes
 from factory.floor.geometry.pieces import BOX_FACES, box_piece, is_box
@@ -36,7 +37,6 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.overlaps import Finder
 from factory.pipeline import all_templates
 from factory.support import console as console_module
-from factory.support import markup
 from factory.support.cache import load, store
 from factory.support.errors import one_line
 from factory.support.files import user_cache

@@ -100,7 +100,7 @@ def raised_anywhere() -> frozenset[str]:
 
 def test_every_code_is_explained_and_every_explained_code_is_there() -> None:
     found = raised_anywhere()
-    assert found - set(codes()) == set(), "write factory/explanations/CODE.txt for these"
+    assert found - set(codes()) == set(), "write explanations/CODE.txt for these"
     assert set(codes()) - found == set(), "these are raised nowhere"
     # one code for each way in which the package passes codes on
     assert {"Syntax", "GearNotClosed", "TwoHolders", "Timeout", "MissingPart", "Stuck"} <= found

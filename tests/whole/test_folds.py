@@ -21,7 +21,14 @@ from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.pnml import write_pnml
 from factory.apps.exports.program_text import write_program
 from factory.apps.few_robots import folding
-from factory.apps.few_robots.folding import fold, folded, kept_apart, lines_of_labels
+from factory.apps.few_robots.folding import (
+    Line,
+    fold,
+    folded,
+    kept_apart,
+    line_of,
+    lines_of_labels,
+)
 from factory.apps.foreign_nets.behaviour import analyse, play
 from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.engine.simulation.request import RunRequest
@@ -32,7 +39,6 @@ from factory.floor.layout.durations import Pace, cycle_of
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import shared
-from factory.theory.compiler.folding import Line, line_of
 from factory.theory.lang import write_pag
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 from factory.theory.nets.gears import Gear, GearNet

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from factory.apps.foreign_nets import pnml_reader
+from factory.apps.log.content import RECORD
 from factory.support import files, xml_tree
 from factory.support.errors import SHOWN, InputError, did_you_mean
-from factory.support.files import MESH, MIB, NET, RECORD, TABLE, TEXT, read_bytes
+from factory.support.files import MESH, MIB, NET, TABLE, TEXT, read_bytes
 from factory.theory.lang import load_templates, read_pag
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT

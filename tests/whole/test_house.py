@@ -23,6 +23,7 @@ from tests.house import (
     this_house,
     twins,
     unexplained,
+    unguided,
     upward_imports,
     vague,
     variants,
@@ -41,6 +42,7 @@ LAWS: tuple[Law, ...] = (
     twins,
     long_modules,
     unexplained,
+    unguided,
     clocks,
     misplaced_tests,
     variants,
@@ -186,6 +188,11 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
     ),
     (long_modules, {"factory/theory/nets/a.py": "x = 1\n" * 351}, "theory.nets.a: 351 lines"),
     (unexplained, {"factory/theory/nets/a.py": "x = 1"}, "theory.nets.a: no docstring"),
+    (
+        unguided,
+        {"factory/theory/nets/__init__.py": "'Nets.'", "factory/theory/nets/a.py": "'A net.'"},
+        "theory.nets: names no module",
+    ),
     (clocks, {"tests/test_a.py": "def f():\n    from time import sleep"}, "tests.test_a reads"),
     (clocks, {"tests/test_a.py": "import time"}, "tests.test_a reads a clock"),
     (

@@ -23,7 +23,8 @@ from factory.engine.record.state import State
 from factory.engine.simulation.mujoco import strength
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import FALL, Simulation
+from factory.engine.simulation.simulation import Simulation
+from factory.engine.simulation.world import FALL
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.hands import gauges

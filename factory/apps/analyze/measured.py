@@ -15,7 +15,7 @@ from factory.apps.analyze.timed import Flow, TimedNet
 from factory.apps.log import Log
 from factory.apps.log.project_table import settings_of
 from factory.engine.simulation.run import mean_interval
-from factory.theory.control.profile import World
+from factory.support.bounds import WorldName
 
 HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
@@ -73,7 +73,7 @@ class Conditions:
     """The conditions of a run, which its prediction assumes."""
 
     settings: Settings
-    world: World
+    world: WorldName
     seed: int
     jitter: float
     wip: int | None

@@ -3,11 +3,12 @@ change it."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterable
 from functools import cached_property
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,15 +29,19 @@ if TYPE_CHECKING:
     from factory.apps.deviations.pushes import Pushes
 
 
-class Breakable(Protocol):
-    """What faults do to the bodies of a factory that continues after failures."""
+class Breakable(ABC):
+    """What faults do to the bodies of a factory that continues after failures. A fault that acts on
+    bodies is a method here, which each world implements (`apps/recovery/`)."""
 
+    @abstractmethod
     def lose(self, robot: int) -> bool:
         """Open a robot's hand, unnoticed by the supervisor. Returns whether it held anything."""
 
+    @abstractmethod
     def slip(self, operation: Operation, metres: float) -> None:
         """Let the last input of an operation under way slip in its hand by `metres` [m]."""
 
+    @abstractmethod
     def spoil(self, label: str, fault: Deviation) -> None:
         """Make the part that a feeder presents defective, or misplace it."""
 

@@ -1,1 +1,2 @@
-"""Drawings and pages that other apps make: SVG and its paper."""
+"""Drawings and pages that other apps make: SVG (`canvas.py`), its paper
+(`tables.py`), and text in XML (`markup.py`)."""

@@ -12,7 +12,7 @@ from itertools import pairwise
 from math import ceil, floor, hypot, log10
 from typing import TYPE_CHECKING, Any
 
-from factory.support.markup import escape, quoteattr
+from factory.apps.drawing.markup import escape, quoteattr
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,10 +11,10 @@ import re
 from collections.abc import Iterable, Iterator
 
 from factory.api import GearNet, MarkedNet, Place, Point2, Position, Project, Transition, marked
+from factory.apps.drawing.markup import escape, quoteattr
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
 from factory.floor.layout.exclusions import coordinated
-from factory.support.markup import escape, quoteattr
 from factory.theory.nets.gears import Gear
 from factory.theory.nets.threaded import Redistribution
 

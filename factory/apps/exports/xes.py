@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
+from factory.apps.drawing.markup import quoteattr
 from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.subject import Subject
 from factory.apps.log.project_table import factory_of
-from factory.support.markup import quoteattr
 
 FORMAT, TAKES = "xes", "log"
 

@@ -11,6 +11,7 @@ from factory.api import Allowance, Factory, Operation, Pace, Plan, Product, Proj
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
+from factory.apps.few_robots.folding import Line
 from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_forms
 from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
@@ -18,7 +19,6 @@ from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hands.misses import NoGrip
 from factory.theory.compiler.expanding import expand
-from factory.theory.compiler.folding import Line
 from factory.theory.problem.plan import THIRD
 
 WIDE = 1.3

@@ -16,8 +16,11 @@ from factory.api import (
     did_you_mean,
 )
 from factory.theory.compiler.assigning import with_crew
-from factory.theory.compiler.folding import Line, begun_by, kind_of, line_of, sides_at, sides_of
+from factory.theory.compiler.folding import begun_by, kind_of, sides_at, sides_of
 from factory.theory.problem.plan import NOBODY
+
+Line = tuple[int, ...]
+"""The tours of a line, as the robots of the factory that is folded."""
 
 
 def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Plan:
@@ -36,6 +39,15 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
     """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
     each robot on no line."""
     return with_crew(factory, [_turn(factory, lines)], catalogue)
+
+
+def line_of(count: int, lines: Iterable[Line]) -> list[int]:
+    """For each of `count` robots the first robot of its line; itself for a robot on no line."""
+    on = list(range(count))
+    for line in lines:
+        for robot in line:
+            on[robot] = min(line)
+    return on
 
 
 def _turn(factory: Factory, lines: Iterable[Line]) -> list[int]:

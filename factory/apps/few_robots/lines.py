@@ -14,7 +14,7 @@ import numpy as np
 
 from factory.api import Catalogue, Factory, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
-from factory.apps.few_robots.folding import count_of, fold, folded
+from factory.apps.few_robots.folding import Line, count_of, fold, folded
 from factory.floor.layout.guidepath import Box
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.findings import STRICT
@@ -22,7 +22,6 @@ from factory.floor.mating.mating import UPRIGHT, levels_of
 from factory.floor.mating.meetings import meetings
 from factory.floor.mating.overlaps import Finder
 from factory.theory.compiler.expanding import Node
-from factory.theory.compiler.folding import Line
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)

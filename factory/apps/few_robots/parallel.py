@@ -21,8 +21,8 @@ from itertools import accumulate
 from math import lcm
 
 from factory.api import NOPART, Diagnostic, Factory, InputError, Plan, Position, did_you_mean
+from factory.apps.few_robots.tees import ROOM
 from factory.support.settings import MOST_BRANCHES
-from factory.theory.compiler.tees import ROOM
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from factory.api import Catalogue, Diagnostic, Factory, InputError, Plan
-from factory.apps.few_robots.folding import line_faults, lines_of_labels
-from factory.theory.compiler.folding import Line
-from factory.theory.compiler.tees import ROOM
+from factory.apps.few_robots.folding import Line, line_faults, lines_of_labels
+
+ROOM = 2
+"""Robots that share a stem."""
 
 HINT = "a tee has two labels that come to one carrier, from one side, by one kind of robot"
 

@@ -17,7 +17,6 @@ from factory.apps.deviations import Campaign
 from factory.apps.live.commands import LASTS, PUSH, Command
 from factory.apps.live.interventions import Interventions
 from factory.apps.live.outages import Outages, Watch
-from factory.engine.simulation.simulation import FALL
 
 RATE = 30.0
 """Frames a second."""
@@ -206,7 +205,7 @@ class Session:
                 act()
             if (trouble := world.hooks.trouble) is not None:
                 self._trouble = f"{trouble.message}: restart it"
-            elif (drop := world.dropped) and world.time >= drop.time + FALL:
+            elif (drop := world.dropped) and drop.is_seen(world.time):
                 self._trouble = f"{drop.diagnostic.message}: restart it"
             elif self._stepping and len(supervisor.events) > before:
                 self._stepping = self._playing = False

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.model import ARENA, broad_phase
+from factory.engine.mjcf.model import memory_of
 from factory.support.files import MIB
 
 LARGEST, TAGS, DEEPEST = 256 * MIB, 2_000_000, 32
@@ -64,8 +64,8 @@ MESH_NAME = re.compile(r"[^/\\]+\.(stl|obj)")
 USER = 8
 """Upper bound on the numbers of a `user`: each geom gets as many as the one with the most."""
 
-SPARE = 1024 * MIB
-"""Upper bound on the memory that a model asks for beyond its need [bytes]."""
+SPARE = 1024
+"""Upper bound on the memory that a model asks for beyond its need [MiB]."""
 
 
 def admitted(xml: str, files: Mapping[str, bytes]) -> str:
@@ -122,7 +122,7 @@ def _check(element: Element, files: Mapping[str, bytes]) -> None:
 
 def _check_memory(root: Element) -> None:
     """Raises ValueError where a model asks for more memory than it needs."""
-    most = (ARENA * MIB + broad_phase(root) + SPARE) // MIB
+    most = memory_of(root) + SPARE
     for element in root.iter("size"):
         asked = element.get("memory", "0M").removesuffix("M")
         if not (asked.isdecimal() and int(asked) <= most):

@@ -14,11 +14,14 @@ from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
-from factory.engine.record.verdict import FAULTS, FIGURES, HEADER, NAMES, RESERVATIONS
+from factory.engine.record.verdict import check_kept_figures
 from factory.floor.layout.saved import LayoutTable
+from factory.support.bounds import WorldName
 from factory.support.settings import AUTO
 from factory.support.tables import LARGE
-from factory.theory.control.profile import World
+
+HEADER = "header"
+"""The figure that is the digest of the header of a log."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class LogHeader(ProjectTable):
     nv: int
     versions: Mapping[str, str]
     command: tuple[str, ...]
-    world: World
+    world: WorldName
     seed: int
     jitter: float
     units: int
@@ -174,22 +177,7 @@ def _check_ragged(name: str, arrays: Arrays, count: int) -> None:
 
 
 def check_figures(figures: Any) -> None:
-    """Raises ValueError where the figures do not have the form of `kept_figures`."""
-    if not isinstance(figures, dict):
-        raise ValueError("its figures are not a table")
-    for figure in FIGURES:
-        value = figures.get(figure)
-        if value is not None and type(value) not in (int, float):
-            raise ValueError(f"its figure '{figure}' is not a number")
+    """Raises ValueError where the figures do not have the form of `kept_figures`, with HEADER."""
+    check_kept_figures(figures)
     if not isinstance(figures.get(HEADER, ""), str):
         raise ValueError(f"its figure '{HEADER}' is not a text")
-    for figure in (*NAMES, RESERVATIONS):
-        if not _are_texts(figures.get(figure, [])):
-            raise ValueError(f"its figure '{figure}' is not a list of texts")
-    faults = figures.get(FAULTS, [])
-    if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
-        raise ValueError(f"its figure '{FAULTS}' is not a list of pairs of texts")
-
-
-def _are_texts(value: Any) -> bool:
-    return isinstance(value, list) and all(isinstance(text, str) for text in value)

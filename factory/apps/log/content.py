@@ -15,8 +15,8 @@ AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 """What helps where a log cannot be used."""
 
 
-LARGE = MIB
-"""A record of more is read in pieces."""
+LARGE, RECORD = MIB, 4096 * MIB
+"""A log of more bytes is read in pieces; one of more than RECORD is refused."""
 
 
 class Stored:

@@ -36,10 +36,10 @@ from factory.apps.log.checks import (
     check_header,
     state_bytes,
 )
-from factory.apps.log.content import Content, content_of
+from factory.apps.log.content import RECORD, Content, content_of
 from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone_in
 from factory.support.claim import is_claimed
-from factory.support.files import LOG, RECORD, head_of
+from factory.support.files import LOG, head_of
 from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]

@@ -32,14 +32,15 @@ from factory.api import (
 )
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
 from factory.apps.log.cell_table import cell_in
-from factory.apps.log.content import content_of
+from factory.apps.log.checks import HEADER
+from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.verdict import HEADER, kept_figures
+from factory.engine.record.verdict import kept_figures
 from factory.floor.layout.saved import LayoutTable
 from factory.support.claim import claimed
-from factory.support.files import RECORD, unwritten
+from factory.support.files import unwritten
 from factory.support.settings import AUTO
 from factory.support.version import release
 

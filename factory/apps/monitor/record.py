@@ -32,7 +32,7 @@ from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
 from factory.engine.record.subject import MonitorTable
-from factory.engine.record.verdict import FAULTS, judged
+from factory.engine.record.verdict import judged
 from factory.theory.nets.replay import replay
 from factory.theory.plant.demand import Word
 
@@ -109,10 +109,7 @@ def verdict_on(
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)
-    if faults:
-        pairs = [[fault.code, fault.message] for fault in faults]
-        figures = {**(figures or {}), FAULTS: [*(figures or {}).get(FAULTS, []), *pairs]}
-    verdict = judged(trouble, refines, figures, report)
+    verdict = judged(trouble, refines, figures, report, faults=faults)
     return verdict.caused_by(log.failures.unseen if log.failures else ())
 
 

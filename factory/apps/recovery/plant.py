@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence, Set
 
 from factory.api import Operation
-from factory.apps.deviations.deviation import Deviation
+from factory.apps.deviations.condition import Breakable
 
 
-class Plant(ABC):
-    """The bodies of a factory in which faults occur, in this order: faults, sensors, responses.
+class Plant(Breakable):
+    """The bodies of a factory in which faults occur: the faults, sensors, responses.
 
     Robots are given by index. A world subclasses it and overrides what it can do; the defaults are
     those of a world in which nothing falls, leans or blocks.
     """
-
-    @abstractmethod
-    def lose(self, robot: int) -> bool:
-        """Open a robot's hand, unnoticed by the supervisor. Returns whether it held anything."""
-
-    @abstractmethod
-    def slip(self, operation: Operation, metres: float) -> None:
-        """Let the last input of an operation under way slip in its hand by `metres` [m]."""
 
     @property
     @abstractmethod
@@ -32,10 +24,6 @@ class Plant(ABC):
     @abstractmethod
     def fresh(self) -> Sequence[tuple[str, int]]:
         """Parts (label, unit) that feeders have begun to present since the last call."""
-
-    @abstractmethod
-    def spoil(self, label: str, fault: Deviation) -> None:
-        """Make the part that a feeder presents defective, or misplace it."""
 
     @abstractmethod
     def supplied(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from factory.api import NOPART, Operation
-from factory.theory.problem.template import Kind, Response
+from factory.theory.problem.template import Kind
 
 
 @dataclass(slots=True)
@@ -20,9 +20,8 @@ class OnEnd:
 
     def response(self, operation: Operation, test: str) -> Kind:
         """The response of the template to a failure of an operation repeated so many times."""
-        tried, none = self.tried[operation.index], tuple[Response, ...]()
-        failures = operation.template.failures
-        responses = next((f.responses for f in failures if f.test == test), none)
+        failure, tried = operation.template.failure(test), self.tried[operation.index]
+        responses = failure.responses if failure else ()
         left = (r for r in responses if r.kind != "again" or tried < r.times)
         return next((response.kind for response in left), "scrap")
 

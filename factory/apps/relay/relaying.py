@@ -31,8 +31,7 @@ from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.durations import cycle_of, gear_times
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
-from factory.support.resources import templates_folder
-from factory.theory.lang.template_reader import load_templates
+from factory.pipeline import all_templates
 
 WITHIN = 1.05
 """Where no cycle time is asked for: that of the most relays there can be, times this."""
@@ -149,7 +148,7 @@ class _Search:
         self.layout, self.ways, self.settings = layout, ways, settings
         self.pace = Pace.of(settings)
         used = {o.template.name: o.template for o in layout.factory.operations}
-        self.templates = {**load_templates([templates_folder()]), **used}
+        self.templates = {**all_templates(), **used}
         self.numbers: dict[str, int] = {}
         self.found = layout
         self.cycle = 0.0

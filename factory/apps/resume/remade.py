@@ -25,11 +25,12 @@ from factory.api import (
     value_of,
 )
 from factory.apps.log import Log
+from factory.apps.log.checks import HEADER
 from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
-from factory.engine.record.verdict import FAULTS, HEADER, RESERVATIONS
+from factory.engine.record.verdict import FAULTS, RESERVATIONS
 
 TAG = re.compile(r"<[^>]+>")
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from factory.api import CutOff, Diagnostic, InputError, Project, RunRequest, Simulation
 from factory.apps.deviations.campaign import campaign_of
 from factory.apps.log.blocks import bad_log
-from factory.apps.log.content import AGAIN, content_of
+from factory.apps.log.content import AGAIN, RECORD, content_of
 from factory.apps.log.project_table import check_names, of_its_factory, project_of
 from factory.apps.log.reader import Log, read_log
 from factory.apps.log.writer import rows_of_a_block, versions
@@ -18,7 +18,6 @@ from factory.apps.recovery.recovery import recover
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.remade import request_of
 from factory.support.claim import claimed_again
-from factory.support.files import RECORD
 from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")

@@ -198,7 +198,7 @@ def build_model(
         root.remove(section["contact"])
     if not shown:
         leave_out_what_is_shown(root)
-    fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
+    fill(section["size"], memory=f"{memory_of(root)}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.axes) + 2 + len(sliders) + jaws + sum(copies.values())
@@ -206,11 +206,11 @@ def build_model(
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
 
 
-def broad_phase(root: Element) -> int:
-    """What the engine's broad phase sets aside [bytes]: two arrays with four bytes for each pair of
-    bodies. Only what is written to is taken from the machine's memory."""
+def memory_of(root: Element) -> int:
+    """The engine's memory for a model [MiB]: ARENA, and what its broad phase sets aside, two arrays
+    with four bytes for each pair of bodies. Only what is written to is taken from the machine's."""
     bodies = sum(1 for _ in root.iter("body")) + 1
-    return 2 * 4 * bodies * (bodies - 1) // 2
+    return ARENA + 2 * 4 * bodies * (bodies - 1) // 2 // 2**20
 
 
 def product_name(factory: Factory) -> str:

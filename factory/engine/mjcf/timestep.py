@@ -28,8 +28,8 @@ from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS
 from factory.engine.mjcf.robots import MOTOR
 from factory.engine.mjcf.stops import tray_clearance
 from factory.floor.layout.layout import Layout
+from factory.support.bounds import WorldName
 from factory.support.settings import AUTO, TICK, Settings
-from factory.theory.control.profile import World
 from factory.theory.plant.axes import Axis
 
 USUAL = 5
@@ -51,7 +51,7 @@ at one speed for a while (`layout/outfeed.py`)."""
 
 
 def timed(
-    settings: Settings, layout: Layout, world: World = "mujoco", jitter: float = 0.0
+    settings: Settings, layout: Layout, world: WorldName = "mujoco", jitter: float = 0.0
 ) -> Settings:
     """Settings whose timestep and substeps are numbers: what was asked for, or with AUTO the
     longest timestep in which nothing goes as far as the certified clearance, with which no axis is

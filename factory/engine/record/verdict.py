@@ -8,7 +8,7 @@ each other, qualifies its success."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Any
@@ -93,6 +93,9 @@ NAMES = tuple(dict.fromkeys(limit.names for limit in LIMITS if limit.names))
 STRENGTH = "grip_strength_share_max"
 """A figure without a bound here: a run in which it is too large has ended by that (Dropped)."""
 
+MEASURED = (*(limit.figure for limit in LIMITS), STRENGTH)
+"""The figures that say how near the bodies of a run came to a failure."""
+
 DROPPED = "dropped_s"
 """The figure with the time at which a load was dropped, which ends a run a little later [s]."""
 
@@ -105,9 +108,6 @@ FIGURES = (
 
 FAULTS = "faults"
 """The figure that lists the faults of the model of a run, as pairs of code and message."""
-
-HEADER = "header"
-"""The figure that is the digest of the header of a log."""
 
 RESERVATIONS = "reservations"
 """The figure that lists what a run does not show, in words."""
@@ -222,32 +222,35 @@ def judged(
     figures: Mapping[str, Any] | None,
     report: Report | None,
     lenient: bool = False,
+    faults: Sequence[Diagnostic] = (),
 ) -> RunVerdict:
     """The verdict on a run: `trouble` ended it early, `refines`: whether its record refines the
     net; `figures` of its bodies, from `kept_figures`, and the `report` of a monitor, where there
-    are any."""
-    timed = sorted(_failures(figures or {}, report), key=lambda failure: failure[0])
-    dropped = (figures or {}).get(DROPPED)
+    are any; `faults` of its model beside those in the figures."""
+    figures = {**(figures or {})}
+    every = [Diagnostic(code, words) for code, words in figures.get(FAULTS, [])]
+    every += faults
+    timed = sorted(_failures(figures, every, report), key=lambda failure: failure[0])
+    dropped = figures.get(DROPPED)
     ended = inf if dropped is None else dropped
     before = sum(t < ended for t, _ in timed)
-    faults = [Diagnostic(code, words) for code, words in (figures or {}).get(FAULTS, [])]
-    unjudged = [fault for fault in faults if fault.code == NOT_JUDGED]
+    unjudged = [fault for fault in every if fault.code == NOT_JUDGED]
     if unjudged:
         return RunVerdict(unjudged[0], refines)
-    blocked = tuple(fault for fault in faults if fault.code == BLOCKED)
+    blocked = tuple(fault for fault in every if fault.code == BLOCKED)
     bodies = tuple(failure for _, failure in timed)
-    doubts = tuple((figures or {}).get(RESERVATIONS, ()))
+    doubts = tuple(figures.get(RESERVATIONS, ()))
     return RunVerdict(trouble, refines, bodies, lenient, before, blocked, doubts)
 
 
 def _failures(
-    figures: Mapping[str, Any], report: Report | None
+    figures: Mapping[str, Any], faults: Iterable[Diagnostic], report: Report | None
 ) -> Iterator[tuple[float, Diagnostic]]:
     """The failures of the bodies of a run, each with its time [s]: those of the model first, those
     of figures without a time and of overlapping parts last."""
-    for code, words in figures.get(FAULTS, []):
-        if code != BLOCKED:
-            yield inf if code == "Overlap" else -inf, Diagnostic(code, words)
+    for fault in faults:
+        if fault.code != BLOCKED:
+            yield inf if fault.code == "Overlap" else -inf, fault
     for limit in LIMITS:
         failure = limit.exceeded(figures)
         if failure is not None:
@@ -264,6 +267,26 @@ def kept_figures(physics: Any) -> dict[str, Any]:
     kept[RESERVATIONS] = [*physics.reservations]
     judged_figures = {limit.figure for limit in LIMITS}
     return {figure: value for figure, value in kept.items() if value or figure in judged_figures}
+
+
+def check_kept_figures(figures: Any) -> None:
+    """Raises ValueError where figures do not have the form of `kept_figures`."""
+    if not isinstance(figures, dict):
+        raise ValueError("its figures are not a table")
+    for figure in FIGURES:
+        value = figures.get(figure)
+        if value is not None and type(value) not in (int, float):
+            raise ValueError(f"its figure '{figure}' is not a number")
+    for figure in (*NAMES, RESERVATIONS):
+        if not _are_texts(figures.get(figure, [])):
+            raise ValueError(f"its figure '{figure}' is not a list of texts")
+    faults = figures.get(FAULTS, [])
+    if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
+        raise ValueError(f"its figure '{FAULTS}' is not a list of pairs of texts")
+
+
+def _are_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(text, str) for text in value)
 
 
 def _of(geom: str) -> str:

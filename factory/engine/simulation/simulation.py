@@ -53,9 +53,6 @@ PATIENCE = 10.0
 
 LOOK = "look at these robots in `factory render`, or give --max-time more"
 
-FALL = 0.5
-"""So long after something was dropped a run goes on, for it to be seen [s]; nothing fires then."""
-
 SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
 
 
@@ -265,7 +262,7 @@ class Simulation:
         if world.hooks.trouble is not None:
             return world.hooks.trouble
         if world.dropped is not None:
-            return world.dropped.diagnostic if world.time >= world.dropped.time + FALL else None
+            return world.dropped.diagnostic if world.dropped.is_seen(world.time) else None
         if self.silent > patience and world.time > world.hooks.busy + patience:
             what = f"nothing fired for {patience:.2f} s of simulated time"
             return self._trouble("Stalled", what, LOOK)

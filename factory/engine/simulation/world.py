@@ -20,6 +20,9 @@ from factory.theory.plant.operation import Operation
 Job = tuple[Operation, int]
 """An operation with the number of the unit that it works on."""
 
+FALL = 0.5
+"""So long after something was dropped a run goes on, for it to be seen [s]; nothing fires then."""
+
 
 @dataclass(slots=True)
 class Hooks:
@@ -90,6 +93,10 @@ class Drop:
 
     time: float
     diagnostic: Diagnostic
+
+    def is_seen(self, now: float) -> bool:
+        """Whether a run has gone on for long enough to show it."""
+        return now >= self.time + FALL
 
 
 class World(Protocol):

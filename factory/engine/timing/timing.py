@@ -21,10 +21,11 @@ from factory.floor.layout.starting import start_positions
 from factory.floor.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.floor.modes.staging import HeadStart, staged, stages_of, with_time
 from factory.support.arrays import Array
+from factory.support.bounds import WorldName
 from factory.support.settings import Settings
 from factory.theory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
 from factory.theory.control.mode import ROUNDING, Limits, Mode
-from factory.theory.control.profile import SpeedProfile, World
+from factory.theory.control.profile import SpeedProfile
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import AxisId, carriage_axis, operation_of
@@ -64,7 +65,7 @@ class Timing:
 
     layout: Layout
     settings: Settings = Settings()  # noqa: RUF009
-    world: World = "mujoco"
+    world: WorldName = "mujoco"
     seed: int = 0
     jitter: float = 0.0
     wip: int | None = None
@@ -204,9 +205,8 @@ class Timing:
         robot = self.factory.operations[leaf].carrier
         hand, sooner = layout.hand(robot), 0.0
         if hand is None or not (hand.first or hand.kind == "above"):
-            fastest = SpeedProfile(
-                self.settings.speed * (1 + self.jitter), self.settings.acceleration
-            )
+            speed = self.settings.speed * (1 + self.jitter)
+            fastest = SpeedProfile(speed, self.settings.acceleration)
             at = float(self.starts[leaf][self.factory.operations[leaf].robots.index(robot)])
             sooner = fastest.rest(max(0.0, layout.guidepaths[robot].length - at))
         return up * tick, max(0, ceil(down - sooner / tick - ROUNDING)) * tick

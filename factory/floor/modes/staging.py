@@ -21,9 +21,9 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.staying import carried_ahead, goes_home
 from factory.floor.modes.modes import operation_starts
 from factory.support.arrays import Array
+from factory.support.bounds import WorldName
 from factory.support.settings import Settings
 from factory.theory.control.mode import ROUNDING, Mode
-from factory.theory.control.profile import World
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import AxisId, carriage_axis
@@ -147,7 +147,7 @@ def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tupl
 
 
 def with_time(
-    layout: Layout, ahead: Sequence[HeadStart], world: World, wip: int | None = None
+    layout: Layout, ahead: Sequence[HeadStart], world: WorldName, wip: int | None = None
 ) -> tuple[HeadStart, ...]:
     """Those of ways ahead for which robots have the time. In the ideal world none waits for a
     feeder, or for its own hand to be away: it takes the next part at once, and its operation moves

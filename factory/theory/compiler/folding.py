@@ -19,23 +19,9 @@ Guarantees: the net is a gear train, live, safe and reversible. What is no fold 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
-
-Line = tuple[int, ...]
-"""The tours of a line, as the robots of the factory that is folded."""
-
-
-def line_of(count: int, lines: Iterable[Line]) -> list[int]:
-    """For each of `count` robots the first robot of its line; itself for a robot on no line."""
-    on = list(range(count))
-    for line in lines:
-        for robot in line:
-            on[robot] = min(line)
-    return on
 
 
 def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:

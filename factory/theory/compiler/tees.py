@@ -22,9 +22,6 @@ from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import RobotId
 from factory.theory.problem.pag import NOPART
 
-ROOM = 2
-"""Robots that share a stem."""
-
 
 def heads(factory: Factory) -> tuple[int, ...]:
     """For each robot the first of those that bring, or help to bring, the same over one stem as it

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import Literal
 
 import numpy as np
 
 from factory.support.arrays import Array
-
-World = Literal["ideal", "mujoco"]
 
 
 def landing_speed(distance: Array, acceleration: Array, dt: float) -> Array:

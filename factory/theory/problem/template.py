@@ -163,7 +163,7 @@ class Template:
         """b_j, the label the carrier holds afterwards; NOPART for dropoff."""
         return self.after[self.carrier - 1]
 
-    def failure(self, test: Test) -> Failure | None:
+    def failure(self, test: str) -> Failure | None:
         """What is done where a test finds a failure; None where it is not tested."""
         return next((failure for failure in self.failures if failure.test == test), None)
 

@@ -17,19 +17,18 @@ import pytest
 
 from factory.apps.log import LogWriter, read_log
 from factory.apps.log.blocks import Arrays, pack_rows, unpack_rows
-from factory.apps.log.content import content_of
+from factory.apps.log.checks import HEADER
+from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.reader import digest_of, header_in
 from factory.apps.log.writer import rows_of_a_block
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.resuming import Resumed
 from factory.engine.record.state import State
-from factory.engine.record.verdict import HEADER
 from factory.engine.simulation.compiled import Compiled, compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
-from factory.support.files import RECORD
 from tests.apps.log.test_log import block_ends
 from tests.apps.log.test_log_damage import put_together, taken_apart
 from tests.command_line import Terminal, spawn, started
