@@ -22,6 +22,9 @@ from factory.floor.layout.hands.hand import Hand
 LANE = 0.32
 """From the station to either end of a line, without the length of what it carries [m]."""
 
+NEAREST = 0.03
+"""Least distance of a carrier behind the product's middle [m]."""
+
 STEP = 0.02
 """Between the stations that are tried for a tool, and least distance of what stands [m]."""
 
@@ -122,12 +125,12 @@ class Line:
 
     def _shifted(self, path: Guidepath) -> Guidepath:
         """A guidepath of the rails, about the product's middle in place of that of what the carrier
-        brings."""
+        brings; the robot has a longer arm where it would be ahead of that middle."""
         (x, y), (u, v), (s, t) = self.off, path.heading, path.side
         along, across = x * u + y * v, x * s + y * t
         return replace(
             path,
-            reach=round(path.reach - along, 6),
+            reach=round(max(path.reach - along, NEAREST), 6),
             arm=round(path.arm - along, 6),
             nest=round(path.nest + along, 6),
             offset=round(path.offset + across, 6),

@@ -28,10 +28,11 @@ from tests.arm_cells import SMALL, chains, project, refusal, run
 POST = """root = p;
 p = inspect ( q, dwell = 0.2 ); q = mate ( a, s );
 s = press ( t, dwell = 0.2 ); t = mate ( b, c );
-a = atomic ( box = (0.09, 0.06, 0.02), pos = (0, 0, 0.01), density = 1200 );
-b = atomic ( box = (0.04, 0.04, 0.02), pos = (0.01, 0, 0.0301), density = 1200 );
-c = atomic ( box = (0.03, 0.03, 0.02), pos = (0.01, 0, 0.0502), density = 1200 )"""
-"""A base, and on it a block with a knob, which is pressed on before."""
+a = atomic ( box = (0.28, 0.06, 0.02), pos = (0, 0, 0.01), density = 500 );
+b = atomic ( box = (0.04, 0.04, 0.02), pos = (0.115, 0, 0.0301), density = 1200 );
+c = atomic ( box = (0.03, 0.03, 0.02), pos = (0.115, 0, 0.0502), density = 1200 )"""
+"""A base, and at its front end a block with a knob, which is pressed on before: the carrier that
+brings the block has it ahead of the product's middle."""
 
 ROOF = """root = p;
 p = mate ( a, s, d ); s = mate ( b, c );
