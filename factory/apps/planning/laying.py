@@ -138,7 +138,10 @@ class Layouts:
         laid = self.drafted(judged)
         tree, plain = laid.tree, laid.project
         if judged.stance not in self._products:
-            product = product_geometry(plain.pag, self.source.files, report=self.report)
+            entered = next((one.entered for one in self._products.values()), None)
+            product = product_geometry(
+                plain.pag, self.source.files, report=self.report, entered=entered
+            )
             twin = self.source.product, judged.stance.rotation
             self._products[judged.stance] = replace(product, twin=twin)
         project = plain.with_product(self._products[judged.stance], as_drawn=True)

@@ -77,19 +77,23 @@ def product_geometry(
     files: Mapping[str, bytes] = MappingProxyType({}),
     decomposed: bool = True,
     report: Callable[[int, int], None] = lambda *_: None,
+    entered: frozenset[str] | None = None,
 ) -> Product:
     """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
     of the PAG. Where it is not `decomposed`, meshes that are not convex have their hulls for
-    bodies. `report` is called with the number of meshes that are read, and of how many. Raises
-    InputError if a mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy
-    for the engine (BadValue)."""
+    bodies. `report` is called with the number of meshes that are read, and of how many. `entered`:
+    the parts in which others stand, where that is known of another attitude. Raises InputError if a
+    mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy for the engine
+    (BadValue)."""
     reader = _Reader(Path(pag.folder), files, decomposed, report)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
     reader.read([node for node in leaves if node.parameter("mesh") is not None])
     shaped = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in shaped.items() if solid is not None}
-    if decomposed and (entered := stood_in([*solids.values()])):
+    if entered is None:
+        entered = stood_in([*solids.values()]) if decomposed else frozenset()
+    if entered:
         bored = {_file(node) for node in leaves if node.label in entered}
         again = [(n, i) for i, n in enumerate(leaves) if n.label in solids and _file(n) in bored]
         reader.read([node for node, _ in again], entered=True)
@@ -105,7 +109,7 @@ def product_geometry(
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
     warnings = (*reader.warnings.values(), *size_warnings(pag, low, high))
-    return Product(solids, low, high, warnings)
+    return Product(solids, low, high, warnings, entered=entered)
 
 
 def _has_shape(node: Assembly) -> bool:

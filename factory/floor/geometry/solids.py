@@ -86,6 +86,7 @@ class Product(Keeping):
         warnings: what was found in its shapes.
         twin: a product with the same parts, and the turn (3, 3) from it, which brings axes onto
             axes: what was measured of one is not measured again.
+        entered: the parts in whose holes and hollows others stand.
     """
 
     solids: Mapping[str, Solid]
@@ -93,6 +94,7 @@ class Product(Keeping):
     high: Array
     warnings: tuple[Diagnostic, ...] = ()
     twin: tuple[Product, Array] | None = field(default=None, compare=False, repr=False)
+    entered: frozenset[str] = field(default=frozenset(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))

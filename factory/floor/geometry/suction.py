@@ -33,6 +33,9 @@ PLACES = 9
 EVEN = GAP / 2
 """The tolerance for equal heights [m]."""
 
+HIGHEST = 128
+"""Of the triangles over a place so many are looked at at a time, those that reach highest first."""
+
 Corner = Array
 """A corner of a rectangle in plan (2,) [m]."""
 
@@ -53,15 +56,16 @@ def pad_place(
     taken: tuple[Corner, Corner] | None = None,
     largest: float = WIDEST,
     share: float = SHARE,
+    terrains: Terrains | None = None,
 ) -> PadPlace:
     """The place of a pad on a part that leaves with a heading, a horizontal direction along an
     axis. The pad has the `largest` radius [m], but at most that `share` of the part's least extent
     in plan, stays out of the rectangle that is `taken`, and is smaller if necessary. Among equal
     places the one nearest to the centre of mass is chosen; places with material under the middle
-    are preferred."""
+    are preferred. `terrains`: those of the part, where they are known."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
     widest = max(min(largest, share * float((high - low).min())), NARROWEST)
-    faces, drawn = Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))
+    faces, drawn = terrains or terrains_of(solid)
     for radius in (widest, widest / 2, widest / 4):
         places = _grid(solid, radius)
         centre = places[0]
@@ -108,68 +112,79 @@ def _at(place: Corner, top: float, radius: float, level: bool = False) -> PadPla
 
 @dataclass(frozen=True, slots=True)
 class Terrain:
-    """Triangles (n, 3, 3), and the corners `low` and `high` (n, 2) of their boxes in plan [m]."""
+    """Triangles (n, 3, 3), those that reach highest first, with their greatest heights `tops` (n,)
+    and their boxes in plan, `low` and `high` (2, n) [m]."""
 
     triangles: Array
+    tops: Array
     low: Array
     high: Array
 
     @classmethod
     def of(cls, triangles: Array) -> Terrain:
         """The terrain of triangles (n, 3, 3)."""
-        plan = triangles[..., :2]
-        return cls(triangles, plan.min(axis=1), plan.max(axis=1))
+        tops = triangles[..., 2].max(axis=1)
+        order = np.argsort(-tops, kind="stable")
+        one, two, three = triangles[order, :, :2].transpose(1, 2, 0)
+        low, high = (ends(ends(one, two), three) for ends in (np.minimum, np.maximum))
+        return cls(triangles[order], tops[order], low, high)
 
     def height_in(self, low: Corner, high: Corner) -> float:
         """The greatest height over a rectangle in plan, -inf if nothing is there."""
-        kept = ((self.low <= high) & (self.high >= low)).all(axis=1)
-        return _height_in(self.triangles[kept], low, high)
+        kept = (self.low[0] <= high[0]) & (self.high[0] >= low[0])
+        kept &= self.low[1] <= high[1]
+        kept &= self.high[1] >= low[1]
+        height, near = -np.inf, np.flatnonzero(kept)
+        while len(near) and self.tops[near[0]] > height:
+            height = max(height, _height_in(self.triangles[near[:HIGHEST]], low, high))
+            near = near[HIGHEST:]
+        return height
+
+
+Terrains = tuple[Terrain, Terrain]
+"""Those of the convex bodies of a part, and of the part as it is drawn."""
+
+
+def terrains_of(solid: Solid) -> Terrains:
+    """The terrains of a part."""
+    return Terrain.of(_pieces(solid)), Terrain.of(drawn_triangles(solid))
 
 
 def _height_in(near: Array, low: Corner, high: Corner) -> float:
     """The greatest height of triangles (n, 3, 3) over a rectangle in plan, -inf if there are none:
     at their corners and, of those that reach higher than these, at the corners of the rectangle and
     where edges cross its sides."""
-    corners = near.reshape(-1, 3)
-    top = _highest(corners, low, high)
+    x, y, z = near.reshape(-1, 3).T
+    inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
+    top = float(z[inside].max(initial=-np.inf))
     near = near[near[..., 2].max(axis=1) > top]
     if not len(near):
         return top
-    points = [_over_corners(near, low, high)]
     begin, way = near.reshape(-1, 3), (np.roll(near, -1, axis=1) - near).reshape(-1, 3)
-    for axis in (0, 1):
-        for side in (low[axis], high[axis]):
-            with np.errstate(divide="ignore", invalid="ignore"):
-                share = (side - begin[:, axis]) / way[:, axis]
+    at, along, sides = begin.T[:, None], way.T[:, None], np.stack([low, high], axis=1)[..., None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for axis, across in ((0, 1), (1, 0)):
+            share = (sides[axis] - at[axis]) / along[axis]
+            place, height = at[across] + share * along[across], at[2] + share * along[2]
             crosses = (share >= 0) & (share <= 1)
-            at = begin[crosses] + share[crosses, None] * way[crosses]
-            at[:, axis] = side
-            points.append(at)
-    return max(top, _highest(np.concatenate(points), low, high))
+            crosses &= (place >= low[across]) & (place <= high[across])
+            top = float(height[crosses].max(initial=top))
+    return _over_corners(near, low, high, top)
 
 
-def _highest(points: Array, low: Corner, high: Corner) -> float:
-    """The greatest height of the points (n, 3) over a rectangle in plan, -inf if there are none."""
-    inside = ((points[:, :2] >= low) & (points[:, :2] <= high)).all(axis=1)
-    return float(points[inside, 2].max(initial=-np.inf))
-
-
-def _over_corners(triangles: Array, low: Corner, high: Corner) -> Array:
-    """The points (n, 3) of triangles over the corners of a rectangle."""
+def _over_corners(triangles: Array, low: Corner, high: Corner, least: float) -> float:
+    """The greatest height of triangles (n, 3, 3) over the corners of a rectangle, at least
+    `least`."""
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     flat = np.abs(area) > 1e-18
     a, u, v, area = a[flat], u[flat], v[flat], area[flat]
-    points = []
-    for x in (low[0], high[0]):
-        for y in (low[1], high[1]):
-            dx, dy = x - a[:, 0], y - a[:, 1]
-            s = (dx * v[:, 1] - dy * v[:, 0]) / area
-            t = (u[:, 0] * dy - u[:, 1] * dx) / area
-            over = (s >= 0) & (t >= 0) & (s + t <= 1)
-            z = (a[:, 2] + s * u[:, 2] + t * v[:, 2])[over]
-            points.append(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
-    return np.concatenate(points)
+    corners = np.array([low, (low[0], high[1]), (high[0], low[1]), high])[..., None]
+    dx, dy = corners[:, 0] - a[:, 0], corners[:, 1] - a[:, 1]
+    s = (dx * v[:, 1] - dy * v[:, 0]) / area
+    t = (u[:, 0] * dy - u[:, 1] * dx) / area
+    over = (s >= 0) & (t >= 0) & (s + t <= 1)
+    return float((a[:, 2] + s * u[:, 2] + t * v[:, 2])[over].max(initial=least))
 
 
 def _pieces(solid: Solid) -> Array:

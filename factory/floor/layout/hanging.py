@@ -16,7 +16,9 @@ from factory.floor.geometry.suction import (
     SHARE,
     WIDEST,
     PadPlace,
+    Terrains,
     pad_place,
+    terrains_of,
 )
 from factory.floor.geometry.turning import presented
 from factory.floor.layout.dimensions import PAD, PAYLOAD
@@ -85,6 +87,7 @@ class _FeederPads:
 
     def __init__(self, _: Product) -> None:
         self._found: dict[object, PadPlace] = {}
+        self._terrains: dict[str, Terrains] = {}
 
     def of(self, outlet: Outlet) -> PadPlace:
         """That of an outlet's part, about the product's middle and from its lowest point, in the
@@ -95,7 +98,10 @@ class _FeederPads:
         key = shape, solid.quaternion.tobytes(), heading, taken
         if key not in self._found:
             low, high = np.array(taken).reshape(2, 2) + solid.position[:2]
-            place = pad_place(solid, heading, (low, high))
+            if outlet.label not in self._terrains:
+                self._terrains[outlet.label] = terrains_of(solid)
+            terrains = self._terrains[outlet.label]
+            place = pad_place(solid, heading, (low, high), terrains=terrains)
             self._found[key] = PadPlace(place.at - solid.position, place.radius)
         pad = self._found[key]
         return _seen(outlet, pad.at + solid.position, pad.radius)

@@ -3,12 +3,11 @@ that is shut, and comes back), the slot in the tray for a round bottom, and what
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from math import sqrt
 
 import numpy as np
 
-from factory.floor.geometry.solids import Solid
 from factory.floor.layout.dimensions import (
     BEHIND,
     BELT_GAP,
@@ -22,7 +21,7 @@ from factory.floor.layout.dimensions import (
 )
 from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.hands.surfaces import Body
+from factory.floor.layout.hands.surfaces import Body, Surfaces
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
 from factory.support.settings import Settings
@@ -152,11 +151,11 @@ def dip_of(layout: Layout, slot: tuple[float, float, float] | None, label: str =
     x, y = layout.product.middle[:2].tolist()
     beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
     plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
-    solids, bottom = layout.product.solids, float(layout.product.low[2])
+    bodies, bottom = layout.product.kept(Surfaces).bodies, float(layout.product.low[2])
     if label:
-        solids = {part: solids[part] for part in layout.factory.contents[label]}
-        bottom = float(min(solid.low[2] for solid in solids.values()))
-    return dip(solids.values(), bottom, plates)
+        bodies = {part: bodies[part] for part in layout.factory.contents[label]}
+        bottom = float(min(layout.product.solids[part].low[2] for part in bodies))
+    return dip([body for of_part in bodies.values() for body in of_part], bottom, plates)
 
 
 def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
@@ -176,10 +175,9 @@ def slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[P
     ]
 
 
-def dip(solids: Iterable[Solid], bottom: float, plates: list[HalfSpace]) -> float:
-    """Height difference between the `bottom` of a product and the lowest point of its solids over
+def dip(bodies: Sequence[Body], bottom: float, plates: list[HalfSpace]) -> float:
+    """Height difference between the `bottom` of a product and the lowest point of its bodies over
     some level plates [m]; 0 where they are over none."""
-    bodies = [body for solid in solids for body in Body.of(solid)]
     least = np.inf
     for body in sorted(bodies, key=lambda body: float(body.low[2])):
         if float(body.low[2]) >= least:

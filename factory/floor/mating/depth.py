@@ -16,13 +16,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.support.arrays import Array
 
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
+
 SMALL = 1e-12
+
+MANY = 1 << 14
+"""The most pairs of normals and vertices that are looked at each."""
 
 CORNERS = np.array([*product((0.0, 1.0), repeat=3)])
 """The corners (8, 3) of a unit box."""
@@ -60,13 +67,24 @@ class Polytope:
         return np.asarray(_support(self.normals, self.vertices))
 
 
-def polytope(vertices: Array) -> Polytope:
-    """The hull of vertices; of flat ones, which have no hull, the axes' directions."""
+def solid_hull(vertices: Array) -> ConvexHull | None:
+    """The hull of vertices; None for flat ones, which have none."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
-        hull = ConvexHull(vertices)
+        return ConvexHull(vertices)
     except QhullError:
+        return None
+
+
+def polytope(vertices: Array) -> Polytope:
+    """The hull of vertices; of flat ones, which have no hull, the axes' directions."""
+    return polytope_of(vertices, solid_hull(vertices))
+
+
+def polytope_of(vertices: Array, hull: ConvexHull | None) -> Polytope:
+    """The same, where their hull is known."""
+    if hull is None:
         normals = np.concatenate([np.eye(3), -np.eye(3)])
         return Polytope(vertices, normals, np.zeros((0, 3, 3)))
     rounded = np.round(hull.equations[:, :3] * 1e7).astype(np.int64)
@@ -91,7 +109,33 @@ def upright_box(low: Array, high: Array) -> Polytope:
 
 
 def _support(normals: Array, vertices: Array) -> Array:
-    return np.asarray((normals @ vertices.T).max(axis=1))
+    """How far vertices (n, 3) reach along normals (k, 3) (k,). Many normals are divided in halves.
+    Of those about a direction only the vertices are looked at that may reach furthest along any: a
+    vertex is behind another that is further along that direction than their distance times how far
+    normals are from it."""
+    if len(normals) * len(vertices) <= MANY or len(normals) == 1:
+        return np.asarray(_heights(normals, vertices).max(axis=1))
+    low, high = normals.min(axis=0), normals.max(axis=0)
+    middle = (low + high) / 2
+    height = vertices @ middle
+    furthest = height.argmax()
+    away = vertices - vertices[furthest]
+    off = np.sqrt((normals - middle) ** 2 @ np.ones(3)).max()
+    ahead = height - height[furthest] + off * np.sqrt(away**2 @ np.ones(3)) >= -SMALL
+    reach, near = np.empty(len(normals)), vertices[ahead]
+    order = np.argsort(normals[:, (high - low).argmax()], kind="stable")
+    for half in np.array_split(order, 2):
+        reach[half] = _support(normals[half], near)
+    return reach
+
+
+def _heights(normals: Array, vertices: Array) -> Array:
+    """How far each vertex (n, 3) is along each normal (k, 3) (k, n), rounded as among many: the
+    products of a single row or column are added up in another order."""
+    if 1 not in (len(normals), len(vertices)):
+        return np.asarray(normals @ vertices.T)
+    twice = np.concatenate([normals, normals]) @ np.concatenate([vertices, vertices]).T
+    return np.asarray(twice[: len(normals), : len(vertices)])
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.floor.layout.hands.surfaces import FLAT, Body, blocks
-from factory.support.arrays import Array
+from factory.floor.layout.hands.envelopes import FLAT
+from factory.floor.layout.hands.surfaces import Body, blocks
+from factory.support.arrays import Array, Index
+
+MANY = 1 << 14
+"""The most pairs of discs and edges that are looked at each."""
 
 SAME = 1e-6
 """What reaches no further out by this is not looked at [m]."""
@@ -39,39 +43,58 @@ def outermost(
         )
         for near in blocks(np.flatnonzero((beside < radii) & (reach < out - SAME))):
             reached = (
-                out
-                if body.boxed
-                else _within(body, points[near], radii[near], side, float(reach[near].min()))
+                out if body.boxed else _within(body, points[near], radii[near], side, reach[near])
             )
             reach[near] = np.maximum(reach[near], reached)
     return reach
 
 
-def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], least: float) -> Array:
+def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], least: Array) -> Array:
     """How far out one body reaches within discs about points (n, 3), or less where that is no
-    further than `least`; -inf for nowhere."""
+    further than is `least` (n,); -inf for nowhere."""
     axis, way = side
     if body.ball:
         half = body.dome(points, axis, radius)
         return np.where(half < 0, -np.inf, way * (body.low + body.high)[axis] / 2 + half)
     across = [a for a in range(3) if a != axis]
     at = points[:, across]
-    edges = body.edges[(way * body.edges[:, :, axis]).max(axis=1) > least]
-    on_edges = _on_edges(edges[:, :, across], way * edges[:, :, axis], at, radius)
-    normals, reach = body.faces
-    facing = way * normals[:, axis] > FLAT
-    if not facing.any():
+    every = np.arange(len(body.edges))
+    on_edges = _highest_edge(body, every, at, radius, side, least)
+    faces = body.facing[axis][1 if way < 0 else 2]
+    if not len(faces):
         return on_edges
-    up, slopes = np.abs(normals[facing, axis]), normals[facing][:, across]
-    steep = np.hypot(*slopes.T)
-    rises = (reach[facing] - at @ slopes.T + radius[:, None] * steep) / up
     # the body is below all its faces, so it rises no higher than the one that rises least
-    least = rises.argmin(axis=1)
+    lowest = faces.nearest(at, radius)
+    slopes, steep = faces.across.T[lowest], faces.steep[lowest]
     rim = np.zeros((len(at), 3))
-    rim[:, across] = at - radius[:, None] * (slopes / np.maximum(steep, FLAT)[:, None])[least]
+    rim[:, across] = at - radius[:, None] * (slopes / np.maximum(steep, FLAT)[:, None])
     first, last = body.crossed(rim, axis)
     out = np.where(first <= last, last if way > 0 else -first, -np.inf)
     return np.asarray(np.maximum(on_edges, out))
+
+
+def _highest_edge(
+    body: Body, edges: Index, at: Array, radius: Array, side: tuple[int, int], least: Array
+) -> Array:
+    """How far out some edges of a body reach within discs about points (n, 2), or less where that
+    is no further than is `least` (n,). Of many discs and edges the discs are divided in halves,
+    and of edges those are looked at that are near, and reach further."""
+    (axis, way), (low, high) = side, body.edge_boxes
+    across = [a for a in range(3) if a != axis]
+    begin, end = at.min(axis=0) - radius.max() - FLAT, at.max(axis=0) + radius.max() + FLAT
+    near = (high[axis, edges] if way > 0 else -low[axis, edges]) > least.min()
+    for line, first, last in zip(across, begin, end, strict=True):
+        near &= (high[line, edges] >= first) & (low[line, edges] <= last)
+    edges = edges[near]
+    if len(at) * len(edges) <= MANY or len(at) == 1:
+        ends = body.edges[edges]
+        return _on_edges(ends[:, :, across], way * ends[:, :, axis], at, radius)
+    measures = np.column_stack([at, 2 * radius, least])
+    order = np.argsort(measures[:, np.ptp(measures, axis=0).argmax()], kind="stable")
+    reach = np.empty(len(at))
+    for half in np.array_split(order, 2):
+        reach[half] = _highest_edge(body, edges, at[half], radius[half], side, least[half])
+    return reach
 
 
 def _on_edges(ends: Array, out: Array, at: Array, radius: Array) -> Array:

@@ -314,8 +314,10 @@ def _covered(
     pad over which its bellows reach the surface, and the position of its face along the axis, on
     what stands out most under it [m]."""
     (axis, way), sizes = side, np.array(radii)
-    rims = points + sizes[:, None, None] * _ring(axis)[:, None, None]
-    out = surfaces.outermost(parts, rims.reshape(-1, 3), side).reshape(rims.shape[:3])
+    every = (sizes[:, None] * _ring(axis)[:, None]).reshape(-1, 3)
+    rims, which = np.unique(every, axis=0, return_inverse=True)  # a pad's middle is all pads'
+    out = surfaces.outermost(parts, (rims[:, None] + points).reshape(-1, 3), side)
+    out = out.reshape(len(rims), -1)[which].reshape(2 * RAYS + 1, len(sizes), -1)
     bodies = [body for part in parts for body in surfaces.bodies[part]]
     discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
     most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])

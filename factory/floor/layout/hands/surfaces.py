@@ -11,13 +11,18 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from itertools import product as pairs
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from factory.floor.geometry.pieces import BOX_FACES, is_box
 from factory.floor.geometry.solids import Product, Solid
-from factory.floor.mating.depth import polytope
+from factory.floor.layout.hands.envelopes import FLAT, Envelope, Faces
+from factory.floor.mating.depth import polytope_of, solid_hull
 from factory.support.arrays import Array, Index, Truth
+
+if TYPE_CHECKING:
+    from scipy.spatial import ConvexHull
 
 Way = tuple[float, float]
 """A direction of the world in the plane."""
@@ -28,48 +33,9 @@ TOUCH = 1e-5
 FEW = 4
 """Of more boxes than this those that are near are looked for first."""
 
-FLAT = 1e-9
-"""A face whose normal has a smaller share along a line is parallel to it."""
-
-
-MANY = 1 << 15
-"""The most pairs of points and faces whose room is computed for each pair."""
-
 BLOCK = 256
 """Of so many points it is looked at together where they are on a body of many faces: what is worked
 out for each point and face stays in the processor's cache."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Faces:
-    """Some faces of a body as seen along an axis: the shares of their outward normals `across`
-    (2, f) it and, without sign, `along` (f,) it, 1 where they are parallel to it, and how far they
-    reach along their normals, `offsets` (f,) [m]."""
-
-    along: Array
-    across: Array
-    offsets: Array
-
-    def room(self, at: Array) -> Array:
-        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]:
-        along the axis or, where the face is parallel to it, across."""
-        return np.asarray((self.offsets - at @ self.across) / self.along)
-
-    def least(self, at: Array) -> Array:
-        """The least room (n,) of points (n, 2); infinite without faces. Many points are divided in
-        halves. Room is linear in the point, so that of a face within a rectangle is between those
-        at the corners: a face is left out where another has less even at its worst corner."""
-        if len(at) * len(self.offsets) <= MANY or len(at) == 1:
-            return np.asarray(self.room(at).min(axis=1, initial=np.inf))
-        low, high = at.min(axis=0), at.max(axis=0)
-        ends = self.room(np.array([*pairs(*zip(low, high, strict=True))]))
-        least = ends.min(axis=0) <= ends.max(axis=0).min() + FLAT
-        faces = Faces(self.along[least], self.across[:, least], self.offsets[least])
-        order = np.argsort(at[:, (high - low).argmax()], kind="stable")
-        room = np.empty(len(at))
-        for half in np.array_split(order, 2):
-            room[half] = faces.least(at[half])
-        return room
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +57,14 @@ class Body:
             yield cls(low, high, piece, ball)
 
     @cached_property
+    def _hull(self) -> ConvexHull | None:
+        """Its hull; None where it is too thin for one."""
+        return solid_hull(self.vertices)
+
+    @cached_property
     def faces(self) -> tuple[Array, Array]:
         """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
-        hull = polytope(self.vertices)
+        hull = polytope_of(self.vertices, self._hull)
         return hull.normals, hull.reach
 
     @cached_property
@@ -111,22 +82,35 @@ class Body:
         return tuple(by_axis)
 
     @cached_property
+    def _envelopes(self) -> tuple[tuple[Envelope, Envelope, Envelope], ...]:
+        """Those of the faces over its box, a little widened."""
+        by_axis = []
+        for axis, faces in enumerate(self.facing):
+            across = [a for a in range(3) if a != axis]
+            low, high = self.low[across] - FLAT, self.high[across] + FLAT
+            one, two, three = (Envelope(some, low, high) for some in faces)
+            by_axis.append((one, two, three))
+        return tuple(by_axis)
+
+    @cached_property
     def edges(self) -> Array:
         """The ends (e, 2, 3) of its edges, and of lines across faces [m]; of what is too thin for
         faces those of its box."""
         corners, faces = self.vertices, BOX_FACES
         if not is_box(corners):
-            from scipy.spatial import ConvexHull, QhullError
-
-            try:
-                faces = ConvexHull(corners).simplices
-            except QhullError:
+            if self._hull is None:
                 corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
                 return np.asarray(corners[list(combinations(range(8), 2))])
+            faces = self._hull.simplices
         sorted_ends = np.sort(
             np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]])
         )
         return np.asarray(corners[np.unique(sorted_ends, axis=0)])
+
+    @cached_property
+    def edge_boxes(self) -> tuple[Array, Array]:
+        """The least and the greatest coordinates (3, e) of its edges [m]."""
+        return self.edges.min(axis=1).T.copy(), self.edges.max(axis=1).T.copy()
 
     @cached_property
     def boxed(self) -> bool:
@@ -148,16 +132,22 @@ class Body:
         return np.where(away > radius, -1.0, np.sqrt(np.maximum(radius**2 - away**2, 0.0)))
 
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
-        """The intervals in which lines along an axis through points (n, 3), within its box across
-        it, are inside (n,); (inf, -inf) for lines that miss it."""
+        """The intervals in which lines along an axis through points (n, 3) are inside (n,); (inf,
+        -inf) for lines that miss it."""
         if self.ball:
             half = self.dome(points, axis)
             middle = (self.low + self.high)[axis] / 2
             return np.where(half < 0, np.inf, middle - half), np.where(
                 half < 0, -np.inf, middle + half
             )
-        beside, back, out = self.facing[axis]
-        at = points[:, [a for a in range(3) if a != axis]]
+        across = [a for a in range(3) if a != axis]
+        at, low, high = points[:, across], self.low[across] - FLAT, self.high[across] + FLAT
+        over = np.all((at >= low) & (at <= high), axis=1)
+        if not over.all():
+            enter, leave = np.full(len(at), np.inf), np.full(len(at), -np.inf)
+            enter[over], leave[over] = self.crossed(points[over], axis)
+            return enter, leave
+        beside, back, out = self._envelopes[axis]
         first, last = -back.least(at), out.least(at)
         inside = (beside.least(at) >= -FLAT) & (first <= last)
         return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
