@@ -34,13 +34,10 @@ FULL = pi - 0.1
 TURN, CIRCLES = 0.04, 4
 """Between the angles that are tried for a feeder or a line [rad], and number of circles."""
 
-EASY = 0.41
-"""Share of the width of an arm's ring where its wrist is easily turned."""
-
 WRIST_BACK = 0.2
 """How far an arm's wrist is behind the tip of its tool, about [m]."""
 
-BEHIND, BESIDE = 0.24, 0.06
+BEHIND, BESIDE = 0.3, 0.07
 """How far the wrist of an arm reaches behind the tip of a tool that lies level, and how far beside
 it [m]."""
 
@@ -103,16 +100,14 @@ class Arrangement(Handling):
         lines = dict[int, Line]()
         for carrier, draft in self.drafts.items():
             if carrier:
-                taken = [box for line in lines.values() for box in self._span(line)]
-                lines[carrier] = self._beside(draft, taken)
+                lines[carrier] = self._beside(draft, [*map(self._span, lines.values())])
             else:
                 lines[carrier] = replace(draft, station=self.station, ahead=self.lane)
         return lines
 
-    def _span(self, line: Line) -> list[Box]:
-        """All that a line may take, wherever its tools and its feeder are, and at the station what
-        an arm's wrist may; beside one that ends at an arm there is room for what the arm brings
-        [m]."""
+    def _span(self, line: Line) -> Box:
+        """All that a line may take, wherever its tools and its feeder are; beside one that ends at
+        an arm there is room for what the arm brings, and for its wrist [m]."""
         (x, y), (low, high) = line.station, line.band
         room = APART if line.carrier else 0.0
         ahead = x + line.ahead + line.extent[1] + room
@@ -121,7 +116,7 @@ class Arrangement(Handling):
             if line.carrier in (burden.onto, burden.source) and not self.is_upright(label):
                 at = np.array(line.station) + (self.tip[label] - self.product.middle)[:2]
                 boxes.append(_wrist(at, burden.hold.normal))
-        return boxes
+        return hull(boxes)
 
     def _beside(self, line: Line, taken: Sequence[Box]) -> Line:
         """A line where it is clear of others."""
@@ -133,8 +128,7 @@ class Arrangement(Handling):
             u, v = line.off
             at = x + radius * cos(turned) - u, y + radius * sin(turned) - v
             placed = replace(line, station=(round(at[0], 6), round(at[1], 6)))
-            mine = self._span(placed)
-            if not any(overlap(one, box) for one in mine for box in taken):
+            if not any(overlap(self._span(placed), box) for box in taken):
                 return placed
         message = f"the line of {line.name} has no room at its arm"
         raise RunError(Diagnostic("Layout", message, None, f"smaller parts; {RAILS}"))
@@ -195,10 +189,7 @@ class Arrangement(Handling):
         long as there is room: so the ways of both cross at the station alone."""
         stand, radius = self.stands[arm], self.near + CLOSER
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.clearance
-        angles, taken = (
-            [0.0, 0.0],
-            [box for line in self._lines.values() for box in self._span(line)],
-        )
+        angles, taken = [0.0, 0.0], [*map(self._span, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
             solid = presented(self.product.solids[label])
@@ -223,16 +214,14 @@ class Arrangement(Handling):
     def _anywhere(self, solid: Solid, stand: Stand, first: float, taken: Sequence[Box]) -> Well:
         """The feeder of a part where one has room, on circles round an arm. Raises RunError
         (Layout)."""
-        level = not self.is_upright(solid.label)
-        nearest = self.ring.at(EASY) if level else self.near + CLOSER
-        circles = np.linspace(nearest, self.ring.outer, CIRCLES)
+        circles = np.linspace(self.near + CLOSER, self.ring.outer, CIRCLES)
         wells = [
             self._well(solid, stand, radius, turned)
             for radius in circles.tolist()
             for angle in np.arange(first, FULL, TURN).tolist()
             for turned in (angle, -angle)
         ]
-        if level:
+        if not self.is_upright(solid.label):
             wells.sort(key=lambda well: self._off_wrist(solid.label, well, stand))
         for well in wells:
             if not self._meets(self._room(solid.label, well), taken, APART):
@@ -267,12 +256,12 @@ class Arrangement(Handling):
         return np.asarray(at), np.asarray(normal[:2])
 
     def _off_wrist(self, label: str, well: Well, stand: Stand) -> float:
-        """How far an arm's wrist behind its tool would be from where it is easily turned, where the
-        tool is at a feeder, and how much across the arm the tool would lie there [m]."""
+        """How far an arm's wrist behind its tool would be from the circle through the station where
+        the tool is at a feeder, and how much across the arm the tool would lie there [m]."""
         at, normal = self._face(label, well)
         off = at + WRIST_BACK * normal - stand.place[:2]
         far = float(np.linalg.norm(off))
-        return abs(far - self.ring.at(EASY)) + WRIST_BACK * (1 - abs(float(off @ normal)) / far)
+        return abs(far - self.near) + WRIST_BACK * (1 - abs(float(off @ normal)) / far)
 
     @property
     def _foot(self) -> Array:

@@ -14,9 +14,6 @@ from factory.apps.arms.chain import steiner
 from factory.apps.arms.holds import UP, Hold, holds
 from factory.floor.geometry.suction import PadPlace
 
-EASY = 0.25
-"""A pad whose strength a part's weight needs a smaller share of is good enough."""
-
 
 @dataclass(frozen=True, eq=False)
 class Burden:
@@ -103,16 +100,15 @@ class Burden:
 
     @cached_property
     def hold(self) -> Hold:
-        """The pad on top; of what comes from a side that behind where nothing can be on top, or
-        where its weight would need too much of that and less of the one behind."""
+        """The pad on top; of what comes from a side that on top or behind, whichever its weight
+        needs less of."""
         there = [self.product.solids[part] for part in sorted(self.there)]
         normals = [UP] if self.comes is UP else [UP, self.comes]
         best = [holds(self.solids, there, self.centre, normal)[0] for normal in normals]
         free = [one for one in best if one.clear and one.pad.level]
         if not free:
             return best[-1]
-        used = [one.used(self.mass, self.centre) for one in free]
-        return free[0 if used[0] < EASY else used.index(min(used))]
+        return min(free, key=lambda one: one.used(self.mass, self.centre))
 
 
 def burden_of(factory: Factory, product: Product, first: int) -> Burden:
