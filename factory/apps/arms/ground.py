@@ -32,6 +32,10 @@ class CellGround(Ground):
     rails: Mapping[str, Project] = field(default_factory=dict, compare=False, repr=False)
 
     @property
+    def machines(self) -> str:
+        return "pads, feeders and the tray"
+
+    @property
     def reach_bound(self) -> bool:
         return True
 
