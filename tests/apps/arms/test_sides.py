@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from factory.api import Array, Layout
+from factory.apps.arms.arming import from_one_side
 from factory.apps.arms.holds import facing_up, holds
 from factory.apps.arms.rises import BEND, Rise
 from tests.arm_cells import chains, project, run
@@ -19,6 +20,15 @@ block = atomic ( box = (0.05, 0.06, 0.05), pos = (-0.025, 0, 0.025) );
 roof = atomic ( box = (0.1, 0.06, 0.008), pos = (0, 0, 0.0542) );
 drawer = atomic ( box = (0.045, 0.05, 0.03), pos = (0.0227, 0, 0.03) )"""
 """A block with a roof that reaches beyond it, and what comes from a side to its place below."""
+
+
+BOX = (
+    DRAWER.replace("roof );", "roof, wall1, wall2 );")
+    + """;
+wall1 = atomic ( box = (0.1, 0.006, 0.05), pos = (0, -0.0342, 0.025) );
+wall2 = atomic ( box = (0.1, 0.006, 0.05), pos = (0, 0.0342, 0.025) )"""
+)
+"""The same with walls, between which it comes from one side alone."""
 
 
 @cache
@@ -53,6 +63,19 @@ def test_a_pad_is_on_the_face_that_it_is_asked_for(normal: tuple[float, ...]) ->
     off = out @ (hold.pad.at - part.low) if out.sum() < 0 else out @ (hold.pad.at - part.high)
     assert off == pytest.approx(1e-4) and hold.pad.level
     assert hold.clear == (normal not in ((0, 0, 1), (-1, 0, 0)))
+
+
+@pytest.mark.parametrize(("text", "axis", "sides"), [(DRAWER, 1, (-1, 1)), (BOX, 0, (1,))])
+def test_a_part_comes_along_the_axis_that_is_clear(
+    text: str, axis: int, sides: tuple[int, ...]
+) -> None:
+    made = project(text, "six")
+    approach = made.approaches["chest"]
+    assert (approach.kind, approach.axis, approach.sides) == ("slide", axis, sides)
+    factory = from_one_side(made.compiled)
+    chosen = factory.by_label["chest"].approach
+    assert chosen is not None and chosen.sides == (1,) and not chosen.overlaps[0]
+    assert factory.by_label["case"].lowered >= 0
 
 
 def boxes(layout: Layout, label: str, off: Array) -> tuple[Array, Array]:
