@@ -54,6 +54,7 @@ class Project:
         plan: the variant of the factory.
         laid: the table of its layout; None where one is searched.
         lowered: by operation, the input that is to be lowered there, if it can be.
+        axes: by operation, the axis of the product along which inputs come, if no line tells it.
 
     Raises InputError (BadValue) where relays are asked for of robots with several tours.
     """
@@ -66,6 +67,7 @@ class Project:
     plan: Plan = field(default_factory=Plan)
     laid: LayoutTable | None = field(default=None, repr=False)
     lowered: Mapping[str, str] = field(default_factory=dict, repr=False)
+    axes: Mapping[str, int] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         self.ground.check(self.pag.mix is not None or bool(self.plan.turns))
@@ -173,7 +175,7 @@ class Project:
 
         nodes = expand(self.pag, self.templates, self._single)
         lowered = {**placed(nodes, self.catalogue), **self.lowered}
-        return matings(nodes, self.product, True, lowered, as_drawn)
+        return matings(nodes, self.product, True, lowered, as_drawn, self.axes)
 
     def with_product(self, product: Product, as_drawn: bool = False) -> Project:
         """The same product with solids that have been computed. `as_drawn`: its ways are those of
@@ -288,7 +290,7 @@ class Project:
         check_shapes(factory, self.pag.is_shaped)
         users = {name for name, template in self.templates.items() if not is_shipped(template)}
         tried = users and users & {operation.template.name for operation in factory.operations}
-        if tried:
+        if tried and not self.axes:  # of those no line is on rails
             from factory.floor.modes.modes import check_modes
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)

@@ -122,8 +122,10 @@ def stages_once(folder: Path) -> Iterator[Stages]:
             return lay_out(ground, factory, product, settings, hands, draft)
         return laid_out(ground, factory, product, settings, hands is not None)
 
-    def of_nodes(nodes, product, lifts=True, lowered=MappingProxyType({}), as_drawn=False):
-        return judged(nodes, product, lifts, lowered, as_drawn)
+    nothing = MappingProxyType({})
+
+    def of_nodes(nodes, product, lifts=True, lowered=nothing, as_drawn=False, axes=nothing):
+        return judged(nodes, product, lifts, lowered, as_drawn, axes)
 
     judged = stages.once(matings)
     with pytest.MonkeyPatch.context() as patch:

@@ -220,7 +220,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
             name = alike[0].property.replace("_", " ")
             say(f"  not {name}: and {len(alike) - AGAINST} more (-v shows all)")
     if checked.coordinated is not None:
-        _describe_coordinated(checked.coordinated, verbose)
+        _describe_coordinated(checked.coordinated, checked.machines, verbose)
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]
         listed = ", ".join(f"{label} {count}" for label, count in most)
@@ -237,13 +237,13 @@ def _modes(places: Sequence[Mapping[str, str]], most: int) -> str:
     return " · ".join([*words[:most], *more])
 
 
-def _describe_coordinated(coordinated: CoordinatedNet, verbose: bool) -> None:
-    """Print the size of the coordinated net and whether it is live; its order places if asked for
-    all."""
+def _describe_coordinated(coordinated: CoordinatedNet, machines: str, verbose: bool) -> None:
+    """Print the size of the net that is coordinated with machines and whether it is live; its order
+    places if asked for all."""
     net = coordinated.net
     live = "NO" if coordinated.deadlock else "yes"
     say(
-        f"coordinated with hands, magazines and the tray: {len(net.tokens)} places,"
+        f"coordinated with {machines}: {len(net.tokens)} places,"
         f" {len(net.net.transitions)} transitions, live: {live}"
     )
     places = zip(net.net.places, net.tokens, strict=True)

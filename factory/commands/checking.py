@@ -32,8 +32,9 @@ class Checked:
     each part inside at once; `matings`: how inputs come together, None if no part has its own
     shape; `product`: None if every part is a default box; `no_grips`: what no hand can hold, None
     for a net from PNML; `factory` and the `least` number of robots for its product, None for a
-    net from PNML; the `coordinated` net with hands, magazines and the tray, None if not requested;
-    the number of robots for each product of a mix `alone`."""
+    net from PNML; the `coordinated` net with what else moves, None if not requested;
+    the number of robots for each product of a mix `alone`; what `machines` the net is coordinated
+    with, in words."""
 
     name: str
     net: GearNet | MarkedNet
@@ -48,6 +49,7 @@ class Checked:
     least: Least | None = None
     coordinated: CoordinatedNet | None = None
     alone: tuple[int, ...] = ()
+    machines: str = ""
 
     def counts(self) -> dict[str, int]:
         """The numbers of robots, places, transitions and tokens, and the size of the largest
@@ -169,6 +171,7 @@ def check_project(project: Project, wip: int | None = None, laid_out: bool = Fal
         None if project.pag.mix else least_robots(project.pag, project.templates),
         _coordinated(project) if laid_out or project.ground.reach_bound else None,
         tuple(len(one.compiled.robots) for one in project.each),
+        project.ground.machines,
     )
 
 

@@ -55,6 +55,9 @@ show = (R, j, ~, <a; b>, F) where
 TAKEN, SHOWN = "taken", "shown"
 """What is added to the label of a sub-assembly."""
 
+ACROSS = 0
+"""The axis x of a product, along which its carrier goes."""
+
 TRIES = 12
 """How many other orders of the inputs of joins are tried."""
 
@@ -94,7 +97,34 @@ def _lowering(project: Project, model: ArmModel) -> Project:
                 break
             if not tries:
                 break
-    return made
+    return _from_sides(made)
+
+
+def _from_sides(project: Project) -> Project:
+    """The project in which what is not lowered comes along x where it cannot as well along y."""
+    if project.matings is None:
+        return project
+    waits = {label for label, approach in project.approaches.items() if approach.kind != "lower"}
+    other = replace(project, axes=dict.fromkeys(waits, ACROSS)).matings
+    assert other is not None
+    better = {
+        one.label: ACROSS
+        for one, same in zip(other.all, project.matings.all, strict=True)
+        if one.label in waits and one.slide > same.slide
+    }
+    return replace(project, axes=better) if better else project
+
+
+def from_one_side(factory: Factory) -> Factory:
+    """A factory to whose joins what is not lowered comes from one side: ahead of a carrier, or on
+    the arm's own side of its line, if that is admissible."""
+    operations = tuple(
+        replace(o, approach=o.approach.on(max(o.approach.sides)))
+        if o.approach is not None and o.lowered < 0
+        else o
+        for o in factory.operations
+    )
+    return replace(factory, operations=operations)
 
 
 def _others(

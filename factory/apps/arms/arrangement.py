@@ -18,9 +18,9 @@ from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import LANE, Line, overlap
 from factory.apps.arms.reach import Ring, ring_of
-from factory.floor.geometry.turning import presented
+from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.guidepath import Box, Point2
+from factory.floor.layout.guidepath import Box, Point2, hull
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""
@@ -36,6 +36,13 @@ BOTH = 0.12
 
 TURN, CIRCLES = 0.04, 4
 """Between the angles that are tried for a feeder or a line [rad], and number of circles."""
+
+WRIST_BACK = 0.2
+"""How far an arm's wrist is behind the tip of its tool, about [m]."""
+
+BEHIND, BESIDE = 0.3, 0.07
+"""How far the wrist of an arm reaches behind the tip of a tool that lies level, and how far beside
+it [m]."""
 
 FAR_OFF = 9.0
 """Longer than any line [m]."""
@@ -69,7 +76,12 @@ class Arrangement(Handling):
     @cached_property
     def lane(self) -> float:
         """From the station to the outfeed [m]."""
-        return round(LANE + 2 * float(self.half[0]), 3)
+        ahead = [
+            self.rises(label).aside + BEHIND * burden.hold.normal[0]
+            for label, burden in self.burdens.items()
+            if not burden.onto and burden.comes[0] > 0
+        ]
+        return round(float(max([LANE, *ahead])) + 2 * float(self.half[0]), 3)
 
     @cached_property
     def lines(self) -> dict[int, Line]:
@@ -92,7 +104,7 @@ class Arrangement(Handling):
         lines = dict[int, Line]()
         for carrier, draft in self.drafts.items():
             if carrier:
-                line = self._beside(draft, [*map(_behind, lines.values())])
+                line = self._beside(draft, [*map(self._span, lines.values())])
             else:
                 line = replace(draft, station=self.station, ahead=self.lane)
             steps = self._steps(line)
@@ -120,6 +132,19 @@ class Arrangement(Handling):
                 steps[stops[line.carrier].index] = along - x
         return steps
 
+    def _span(self, line: Line) -> Box:
+        """All that a line may take, wherever its tools and its feeder are; beside one that ends at
+        an arm there is room for what the arm brings, and for its wrist [m]."""
+        (x, y), (low, high) = line.station, line.band
+        room = APART if line.carrier else 0.0
+        ahead = x + line.ahead + line.extent[1] + room
+        boxes = [(x - FAR_OFF, ahead, y + low - room, y + high + room)]
+        for label, burden in self.burdens.items():
+            if line.carrier in (burden.onto, burden.source) and not self.is_upright(label):
+                at = np.array(line.station) + (self.tip[label] - self.product.middle)[:2]
+                boxes.append(_wrist(at, burden.hold.normal))
+        return hull(boxes)
+
     def _beside(self, line: Line, taken: Sequence[Box]) -> Line:
         """A line where it is clear of others."""
         stand, radius = self.stands[self.arms[0]], self.round
@@ -130,7 +155,7 @@ class Arrangement(Handling):
             u, v = line.off
             at = x + radius * cos(turned) - u, y + radius * sin(turned) - v
             placed = replace(line, station=(round(at[0], 6), round(at[1], 6)))
-            if not any(overlap(_behind(placed), box) for box in taken):
+            if not any(overlap(self._span(placed), box) for box in taken):
                 return placed
         message = f"the line of {line.name} has no room at its arm"
         raise RunError(Diagnostic("Layout", message, None, f"smaller parts; {RAILS}"))
@@ -143,10 +168,13 @@ class Arrangement(Handling):
         for label, tip in self.tip.items():
             burden, placed = self.burdens[label], PAYLOAD + float(tip[2]) - low
             fed = burden.source is None
-            shown = self.show + float(tip[2] - burden.low[2]) if fed else placed
-            tips += [shown, placed, shown + self.enters(label).length]
-            tips += [shown + self.exits(label).length]
-            tips += [placed + self.rises(label).length, placed + self.leaves(label).length]
+            shown = self.shows(label) + float(tip[2] - burden.low[2]) if fed else placed
+            tips += [
+                shown,
+                placed,
+                *(shown + e.up for e in (self.enters(label), self.exits(label))),
+            ]
+            tips += [placed + end.up for end in (self.rises(label), self.leaves(label))]
         aside = (tip[:2] - self.product.middle[:2] for tip in self.tip.values())
         spread = max(float(np.linalg.norm(off)) for off in aside)
         ring = ring_of(self.chain, min(tips), max(tips), spread)
@@ -195,7 +223,7 @@ class Arrangement(Handling):
         long as there is room: so the ways of both cross at the station alone."""
         stand, radius = self.stands[arm], self.round
         beside = max(float(self.half[1]), self.factory.carriage / 2) + self.clearance
-        angles, taken = [0.0, 0.0], [*map(_behind, self._lines.values())]
+        angles, taken = [0.0, 0.0], [*map(self._span, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
             solid = presented(self.product.solids[label])
@@ -209,30 +237,36 @@ class Arrangement(Handling):
                 preferred = int(max(angles[0] + pitch, first) + pitch > FULL)
             angle = max(angles[preferred] + pitch, first)
             well = self._well(solid, stand, radius, angle if preferred else -angle)
-            if angle + pitch > FULL or self._meets(well, taken):
+            level = not self.is_upright(label)
+            if level or angle + pitch > FULL or self._meets(self._room(label, well), taken):
                 yield label, (well := self._anywhere(solid, stand, first, taken))
             else:
                 angles[preferred] = angle + pitch
                 yield label, well
-            taken.append(well.feeder.housing)
+            taken.append(self._room(label, well))
 
     def _anywhere(self, solid: Solid, stand: Stand, first: float, taken: Sequence[Box]) -> Well:
         """The feeder of a part where one has room, on circles round an arm. Raises RunError
         (Layout)."""
         circles = np.linspace(self.round, self.ring.outer, CIRCLES)
-        for radius in circles.tolist():
-            for angle in np.arange(first, FULL, TURN).tolist():
-                for turned in (angle, -angle):
-                    well = self._well(solid, stand, radius, turned)
-                    if not self._meets(well, taken, APART):
-                        return well
+        wells = [
+            self._well(solid, stand, radius, turned)
+            for radius in circles.tolist()
+            for angle in np.arange(first, FULL, TURN).tolist()
+            for turned in (angle, -angle)
+        ]
+        if not self.is_upright(solid.label):
+            wells.sort(key=lambda well: self._off_wrist(solid.label, well, stand))
+        for well in wells:
+            if not self._meets(self._room(solid.label, well), taken, APART):
+                return well
         message = f"the feeder of '{solid.label}' has no room round its arm"
         hint = "more arms, smaller parts, or rails: leave out --arm"
         raise RunError(Diagnostic("Layout", message, None, hint))
 
     @staticmethod
-    def _meets(well: Well, taken: Sequence[Box], room: float = 0.0) -> bool:
-        xlo, xhi, ylo, yhi = well.feeder.housing
+    def _meets(taking: Box, taken: Sequence[Box], room: float = 0.0) -> bool:
+        xlo, xhi, ylo, yhi = taking
         grown = xlo - room, xhi + room, ylo - room, yhi + room
         return any(overlap(grown, box) for box in taken)
 
@@ -244,7 +278,27 @@ class Arrangement(Handling):
         if self.ring.is_circle:  # the tool comes there, which is not in the part's middle
             u, v = (self.tip_shown(solid.label) - (solid.low + solid.high) / 2)[:2].tolist()
             at = at[0] - u, at[1] - v
-        return well_of(solid, at, self.product, self.show, self.clearance)
+        return well_of(solid, at, self.product, self.shows(solid.label), self.clearance)
+
+    def _room(self, label: str, well: Well) -> Box:
+        """What a feeder takes, and an arm that takes from it behind its tool [m]."""
+        if self.is_upright(label):
+            return well.feeder.housing
+        return hull([well.feeder.housing, _wrist(*self._face(label, well))])
+
+    def _face(self, label: str, well: Well) -> tuple[Array, Array]:
+        """Where an arm's tool is on a part in its feeder (2,) [m], and the normal there (2,)."""
+        normal = about_vertical(self.burdens[label].fed) @ self.burdens[label].hold.normal
+        at = self.tip_shown(label)[:2] - self.product.middle[:2] + well.place
+        return np.asarray(at), np.asarray(normal[:2])
+
+    def _off_wrist(self, label: str, well: Well, stand: Stand) -> float:
+        """How far an arm's wrist behind its tool would be from the circle through the station where
+        the tool is at a feeder, and how much across the arm the tool would lie there [m]."""
+        at, normal = self._face(label, well)
+        off = at + WRIST_BACK * normal - stand.place[:2]
+        far = float(np.linalg.norm(off))
+        return abs(far - self.near) + WRIST_BACK * (1 - abs(float(off @ normal)) / far)
 
     @property
     def _foot(self) -> Array:
@@ -283,9 +337,13 @@ def pedestal(stand: Stand) -> Box:
     return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
 
 
-def _behind(line: Line) -> Box:
-    """All that a line may take, wherever its tools and its feeder are; beside one that ends at an
-    arm there is room for what the arm brings [m]."""
-    (x, y), (low, high) = line.station, line.band
-    room = APART if line.carrier else 0.0
-    return x - FAR_OFF, x + line.ahead + line.extent[1] + room, y + low - room, y + high + room
+def _wrist(at: Array, normal: Array) -> Box:
+    """What an arm takes behind a tool whose tip is at a place, on a face with a normal that lies
+    level [m]."""
+    x, y = np.stack([at, at + BEHIND * normal[:2]]).T
+    return (
+        float(x.min()) - BESIDE,
+        float(x.max()) + BESIDE,
+        float(y.min()) - BESIDE,
+        float(y.max()) + BESIDE,
+    )

@@ -1,23 +1,18 @@
 """What arms bring: parts from feeders, and sub-assemblies from the carriers that they are built on;
-and where an arm's pad holds each."""
+from where each comes to its place, and where an arm's pad holds it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from factory.api import Array, Factory, Operation, Product, Solid
-from factory.apps.arms.body import PAD_RADIUS
 from factory.apps.arms.chain import steiner
-from factory.floor.geometry.suction import PadPlace, pad_place
-
-SHARES = 0.45, 0.35, 0.25
-"""Radii of pads as shares of a part's least extent in plan that are tried."""
-
-BESIDE = 0.002
-"""Between a pad and what is higher beside it [m]."""
+from factory.apps.arms.holds import UP, Hold, holds
+from factory.floor.geometry.suction import PadPlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,39 +77,38 @@ class Burden:
     @property
     def held(self) -> str:
         """The part that a pad is on."""
-        return self._grip[0]
+        return self.hold.part
 
     @property
     def pad(self) -> PadPlace:
         """Where the pad is on it."""
-        return self._grip[1]
+        return self.hold.pad
+
+    @property
+    def comes(self) -> Array:
+        """The direction from which it comes to its place (3,): from above, or from a side."""
+        approach = self.join.approach
+        if approach is None or self.join.lowered >= 0:
+            return UP
+        (side,) = approach.sides
+        return np.asarray(side * np.eye(3)[approach.axis])
+
+    def reach(self, along: Array, parts: Iterable[str]) -> float:
+        """How far some parts of the product reach along a direction (3,), an axis [m]."""
+        solids = [self.product.solids[part] for part in parts]
+        return max(float(along @ end) for solid in solids for end in (solid.low, solid.high))
 
     @cached_property
-    def _grip(self) -> tuple[str, PadPlace]:
-        """The part and the place of the largest pad that is level, with nothing higher beside it;
-        of the nearest to the centre of mass among equals."""
-        every = [(solid, _largest_pad(solid)) for solid in self.solids]
-        clear = [one for one in every if self._is_clear(one[1], one[0])]
-
-        def rank(one: tuple[Solid, PadPlace]) -> tuple[bool, float, float]:
-            _, place = one
-            off = float(np.linalg.norm(place.at[:2] - self.centre[:2]))
-            return not place.level, -round(place.radius, 4), off
-
-        solid, place = min(clear or every, key=rank)
-        return solid.label, place
-
-    def _is_clear(self, place: PadPlace, of: Solid) -> bool:
-        """Whether no other part is above a pad on one of them."""
-        reach = place.radius + BESIDE
-        low, high = place.at[:2] - reach, place.at[:2] + reach
-        return not any(
-            solid is not of
-            and solid.high[2] > place.at[2]
-            and (solid.low[:2] < high).all()
-            and (solid.high[:2] > low).all()
-            for solid in self.solids
-        )
+    def hold(self) -> Hold:
+        """The pad on top; of what comes from a side that on top or behind, whichever its weight
+        needs less of."""
+        there = [self.product.solids[part] for part in sorted(self.there)]
+        normals = [UP] if self.comes is UP else [UP, self.comes]
+        best = [holds(self.solids, there, self.centre, normal)[0] for normal in normals]
+        free = [one for one in best if one.clear and one.pad.level]
+        if not free:
+            return best[-1]
+        return min(free, key=lambda one: one.used(self.mass, self.centre))
 
 
 def burden_of(factory: Factory, product: Product, first: int) -> Burden:
@@ -124,12 +118,3 @@ def burden_of(factory: Factory, product: Product, first: int) -> Burden:
     parts = factory.contents[takes.label]
     there = frozenset(factory.contents[join.pile])
     return Burden(takes.label, tuple(parts), product, source, join.carrier, join, there)
-
-
-def _largest_pad(solid: Solid) -> PadPlace:
-    """The largest pad that a part is level under; one of the least share for none."""
-    for share in SHARES:
-        place = pad_place(solid, (1.0, 0.0), largest=PAD_RADIUS, share=share)
-        if place.level:
-            break
-    return place

@@ -18,6 +18,7 @@ import numpy as np
 from factory.api import Array, Factory, Product, Solid
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
+from factory.apps.arms.holds import UP, facing_up, product_of, quaternion
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
@@ -54,20 +55,22 @@ class ToolGrip:
 
     Attributes:
         tip: of the tool, in the product's frame (3,) [m].
-        yaw: angle of the tool about the vertical [rad].
+        yaw: angle of the tool about its own axis [rad].
         radius: of what its pad covers there [m].
         kind: of the tip: its pad holds by suction, or a pin in the pad's middle in a bore.
+        normal: out of the face that it is on (3,).
     """
 
     tip: Array
     yaw: float
     radius: float
     kind: Literal["suction", "pin"] = "suction"
+    normal: Array = field(default_factory=UP.copy)
 
     @property
     def turn(self) -> Array:
-        """Orientation of the tool in the world (3, 3), its z down."""
-        return down(self.yaw)
+        """Orientation of the tool in the product's frame (3, 3), its z against the normal."""
+        return facing(self.normal, self.yaw)
 
     def local(self, place: Array) -> Array:
         """A place of the product's frame in that of the tool's tip (3,) [m]."""
@@ -79,6 +82,11 @@ def down(yaw: float) -> Array:
     turn about the horizontal axis at half of that angle."""
     c, s = cos(yaw), sin(yaw)
     return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+
+
+def facing(normal: Array, yaw: float) -> Array:
+    """The orientation (3, 3) of a tool on a face with a normal (3,), turned about that [rad]."""
+    return np.asarray(facing_up(normal).T @ down(yaw))
 
 
 @dataclass(eq=False)
@@ -147,12 +155,17 @@ class CellChains:
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         grip = self.grips[label]
         x, y, z = grip.local(np.asarray(centre)).tolist()
-        return (x, y, z + STEM, 0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0)
+        turn = np.array([0.0, cos(grip.yaw / 2), sin(grip.yaw / 2), 0.0])
+        if not grip.normal[2]:
+            turn = product_of(turn, quaternion(facing_up(grip.normal)))
+        return (x, y, z + STEM, *turn.tolist())
 
     def hand(self, label: str) -> Hand:
         grip = self.grips[label]
         x, y, z = map(float, grip.tip)
-        return Hand("above", ((x, y, z),), grip.radius, tip=grip.kind)
+        return Hand(
+            "above" if grip.normal[2] else "behind", ((x, y, z),), grip.radius, tip=grip.kind
+        )
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

@@ -18,9 +18,8 @@ from factory.apps.arms.inverse import (
     descend,
     least_singular_value,
     nearest_in_range,
-    retreat,
     solutions,
-    straight_line,
+    tool_line,
 )
 from factory.apps.arms.legs import Clearance, NoWay
 
@@ -73,7 +72,7 @@ def candidates(
     puts: tuple[Array, Array],
     clearance: Clearance,
     near: Array,
-    length: float,
+    ends: tuple[Sequence[Array], Sequence[Array]],
 ) -> Candidates:
     """The candidates for a tour whose part may be held in m ways.
 
@@ -83,7 +82,7 @@ def candidates(
         puts: those where it places it.
         clearance: of configurations at both, and at the far ends of the straight lines there.
         near: a configuration; of those that whole turns make equal, the nearest is used [rad, m].
-        length: of the straight lines, along the tool [m].
+        ends: the lines of the tool at either, as the offsets of places from there (l, 3) [m].
     """
     every = solutions(chain, *takes)
     grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
@@ -91,20 +90,62 @@ def candidates(
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
     joined &= good
     grips, q, other = grips[joined], q[joined], other[joined]
-    visits = np.concatenate([q, other])
-    lines, straights = straight_line(chain, visits, retreat(chain, visits), length)
-    follows = straights.reshape(2, -1).all(axis=0)
-    ends = np.concatenate([lines[:, 0], lines[:, -1]])
-    margins, numbers = clearance(ends)
-    margin, pair = margins.reshape(4, -1)[:, follows], numbers.reshape(4, -1)[:, follows]
+    follows, asked = np.ones(len(q), bool), [q, other]
+    for start, lines in zip((q, other), ends, strict=True):
+        for offsets in lines:
+            rows, good = tool_line(chain, start, offsets)
+            follows &= good
+            asked.append(rows[:, -1])
+    margin, pair = _asked(clearance, asked, follows)
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
     blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
     return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
 
 
+def free_candidates(
+    chain: SerialChain,
+    takes: tuple[Array, Array],
+    puts: tuple[Array, Array],
+    clearance: Clearance,
+    near: Array,
+    ends: tuple[Sequence[Array], Sequence[Array]],
+) -> Candidates:
+    """As `candidates`, but with two configurations that need not be on one branch, of which each is
+    away from singular ones."""
+    visits, blocked, reached = list[tuple[Array, Index]](), list[NoWay](), 0
+    for (places, turns), lines in zip((takes, puts), ends, strict=True):
+        every = solutions(chain, places, turns)
+        grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
+        q, good = nearest_in_range(chain, np.concatenate(every), near)
+        good &= least_singular_value(chain, q) >= SINGULAR
+        asked = [q]
+        for offsets in lines:
+            rows, follows = tool_line(chain, q, offsets)
+            good &= follows
+            asked.append(rows[:, -1])
+        reached += int(good.any())
+        margin, pair = _asked(clearance, asked, good)
+        clear = margin.min(axis=0, initial=np.inf) >= 0.0
+        obstacle = None if clear.any() else _obstacle(margin, pair)
+        blocked += [obstacle] if obstacle else []
+        visits.append((q[good][clear], grips[good][clear]))
+    (one, first), (other, last) = visits
+    i, j = np.nonzero(first[:, None] == last)
+    after, inside = nearest_in_range(chain, other[j], one[i])
+    pairs = np.stack([one[i], after], axis=1)[inside]
+    return Candidates(pairs, first[i][inside], reached, blocked[0] if blocked else None)
+
+
+def _asked(clearance: Clearance, places: Sequence[Array], which: Truth) -> tuple[Array, Index]:
+    """The margins and pairs (l, k) at l places of those of m configurations that are asked for."""
+    every = np.stack(places)[:, which]
+    margin, pair = clearance(every.reshape(-1, every.shape[-1]))
+    return margin.reshape(every.shape[:2]), pair.reshape(every.shape[:2])
+
+
 def _obstacle(margin: Array, pair: Index) -> NoWay | None:
-    """What columns of margins and pairs (4, k) say that is too near."""
+    """What columns of margins and pairs (l, k) say that is too near."""
     if not margin.size:
         return None
     worst = margin.argmin(axis=0), np.arange(margin.shape[1])

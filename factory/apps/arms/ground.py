@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from factory.api import Factory, Layout, Product, Project, Settings, usage_error
-from factory.apps.arms.arming import armed, on_rails, piles_of
+from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.request import Ground
@@ -32,6 +32,10 @@ class CellGround(Ground):
     rails: Mapping[str, Project] = field(default_factory=dict, compare=False, repr=False)
 
     @property
+    def machines(self) -> str:
+        return "pads, feeders and the tray"
+
+    @property
     def reach_bound(self) -> bool:
         return True
 
@@ -42,7 +46,7 @@ class CellGround(Ground):
         from factory.floor.mating.mating import judged
 
         assert self.model is not None
-        factory, product = judged(factory, product), repeated(product, factory)
+        factory, product = from_one_side(judged(factory, product)), repeated(product, factory)
         rails = dict[int, Layout]()
         for label, project in self.rails.items():
             carrier = factory.by_label[label].carrier

@@ -13,7 +13,9 @@ from factory.api import Array, Factory, Layout, Product
 from factory.apps.arms.body import STEM
 from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
+from factory.apps.arms.holds import facing_up, product_of, quaternion
 from factory.apps.arms.lines import Line, line_of
+from factory.apps.arms.rises import Rise
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
 from factory.floor.geometry.turning import about_vertical, axis_of, presented
 from factory.floor.layout.dimensions import PAYLOAD
@@ -24,30 +26,14 @@ ABOVE = 0.018
 OVER_WELL = 0.06
 """Length of a straight end at a feeder at least [m]."""
 
-CURVE = 0.06
-"""Length of the most of a straight end that may be rounded, beyond what stays straight [m]."""
+BACK = 0.03
+"""How far an empty tool goes back from a face before it rises beside what stands [m]."""
 
+WRIST = 0.065
+"""Radius of what of an arm is behind a tool, at most [m]."""
 
 KEPT = "burdens", "drafts", "sizes", "tip", "show", "top", "ring"
 """What does not depend on the size of pads, or on where an arm stands."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rise:
-    """A straight end of a way, above the visit.
-
-    Attributes:
-        straight: how far it stays straight; what is beyond may be rounded [m].
-        length: of it all [m].
-    """
-
-    straight: float
-    length: float
-
-    @classmethod
-    def of(cls, straight: float) -> Rise:
-        """One that stays straight so far [m]."""
-        return cls(straight, straight + min(straight, CURVE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +111,22 @@ class Handling:
 
     @cached_property
     def show(self) -> float:
-        """Height at which the bottoms of parts are shown [m]."""
+        """Height at which the bottoms of parts are shown that are held on top [m]."""
         fed = (presented(b.solids[0]) for b in self.burdens.values() if b.source is None)
         return shown_height([*fed], self.clearance)
+
+    def shows(self, label: str) -> float:
+        """Height at which the bottom of a part is shown: an arm's wrist is above other feeders
+        [m]."""
+        return self.show if self.is_upright(label) else self.show + WRIST
+
+    def is_straight(self, label: str) -> bool:
+        """Whether something is held on top, and lowered."""
+        return self.is_upright(label) and bool(self.burdens[label].comes[2])
+
+    def is_upright(self, label: str) -> bool:
+        """Whether something is held on top."""
+        return bool(self.burdens[label].hold.normal[2])
 
     @cached_property
     def sizes(self) -> list[float]:
@@ -139,6 +138,12 @@ class Handling:
         """Radius of the pads of the arms' tools, which may be larger than what they hold [m]."""
         return self.sizes[self.size]
 
+    @property
+    def largest(self) -> int:
+        """The greatest `size` of a pad that has room beside what each burden is placed onto."""
+        room = min(burden.hold.room for burden in self.burdens.values())
+        return max(self.size, int(np.searchsorted(self.sizes, room, "right")) - 1)
+
     def covered(self, label: str) -> float:
         """Radius of what a pad covers of a burden [m]."""
         return min(self.pad, float(self.burdens[label].pad.radius))
@@ -146,8 +151,10 @@ class Handling:
     @cached_property
     def tip(self) -> dict[str, Array]:
         """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
-        off = np.array([0.0, 0.0, GAP - SUCTION_GAP])
-        return {label: np.asarray(b.pad.at + off) for label, b in self.burdens.items()}
+        off = GAP - SUCTION_GAP
+        return {
+            label: np.asarray(b.pad.at + off * b.hold.normal) for label, b in self.burdens.items()
+        }
 
     @cached_property
     def top(self) -> float:
@@ -158,40 +165,70 @@ class Handling:
         """Height of a place of the product's frame on a carrier [m]."""
         return PAYLOAD + z - float(self.product.low[2])
 
+    def _lowest(self, label: str) -> float:
+        """Height above its place in the product's frame of what is lowest of a burden, or of the
+        wrist behind it [m]."""
+        low, tip = float(self.burdens[label].low[2]), float(self.tip[label][2])
+        return low if self.is_upright(label) else min(low, tip - WRIST)
+
+    def _over(self, carrier: int, z: float) -> float:
+        """How far a place of the product's frame rises to where a carrier comes and goes [m]."""
+        return self.drafts[carrier].top + ABOVE - self._height(z)
+
     def rises(self, label: str) -> Rise:
-        """How what an arm brings comes straight down to its place, from where a carrier may still
-        come and go."""
+        """How what an arm brings comes straight to its place, down or from a side, from where a
+        carrier may still come and go."""
         burden = self.burdens[label]
-        stroke = burden.join.approach.stroke if burden.join.approach else 0.0
-        bottom = self._height(float(burden.low[2]))
-        return Rise.of(max(stroke, self.drafts[burden.onto].top - bottom + ABOVE))
+        up, along = self._over(burden.onto, self._lowest(label)), burden.comes
+        if along[2]:
+            return Rise.of(max(burden.join.approach.stroke if burden.join.approach else 0.0, up))
+        aside = burden.reach(along, burden.there) + burden.reach(-along, burden.parts)
+        return Rise.beside(along, aside + ABOVE, up)
 
     def leaves(self, label: str) -> Rise:
-        """How the empty tool goes straight up from where it has placed something."""
-        tip = self._height(float(self.tip[label][2]))
-        return Rise.of(self.drafts[self.burdens[label].onto].top + ABOVE - tip)
+        """How the empty tool goes straight from what it has placed: up, or back and up."""
+        return self._off(label, self.burdens[label].onto)
+
+    def _off(self, label: str, carrier: int) -> Rise:
+        """How the empty tool goes straight from what it holds of what is on a carrier."""
+        burden, tip = self.burdens[label], self.tip[label]
+        normal = burden.hold.normal
+        if normal[2]:
+            return Rise.of(self._over(carrier, float(tip[2])))
+        there = burden.there if carrier == burden.onto else ()
+        beyond = burden.reach(normal, [*there, *burden.parts]) - float(normal @ tip)
+        return Rise.beside(
+            normal, BACK + max(beyond, 0.0), self._over(carrier, float(tip[2]) - WRIST)
+        )
 
     def enters(self, label: str) -> Rise:
-        """How the empty tool comes straight down to what it takes."""
-        source = self.burdens[label].source
-        if source is None:
-            length = max(OVER_WELL, self.top + 2 * ABOVE - self.show)
-            return Rise(length / 2, length)
-        return Rise.of(self.drafts[source].top + ABOVE - self._height(float(self.tip[label][2])))
+        """How the empty tool comes straight to what it takes, from above or from a side and
+        above."""
+        burden = self.burdens[label]
+        if burden.source is not None:
+            return self._off(label, burden.source)
+        up = self.exits(label)
+        if self.is_upright(label):
+            return up
+        normal = about_vertical(burden.fed) @ burden.hold.normal
+        return Rise.beside(normal, BACK, up.length)
 
     def exits(self, label: str) -> Rise:
         """How it goes straight up with it."""
-        burden = self.burdens[label]
-        if burden.source is None:
-            return self.enters(label)
-        return Rise.of(self.drafts[burden.source].top + ABOVE - self._height(float(burden.low[2])))
+        burden, lowest = self.burdens[label], self._lowest(label)
+        if burden.source is not None:
+            return Rise.of(self._over(burden.source, lowest))
+        bottom = self.shows(label) + lowest - float(burden.low[2])
+        length = max(OVER_WELL, self.top + 2 * ABOVE - bottom)
+        return Rise(length / 2, length)
 
     def loads(self, label: str) -> list[tuple[Array, Array, Array]]:
         """The boxes of what an arm brings in the tool's frame, held with the tool's angle at 0:
         place, half sizes, quaternion."""
-        boxes = list[tuple[Array, Array, Array]]()
+        boxes, turn = list[tuple[Array, Array, Array]](), facing_up(self.burdens[label].hold.normal)
+        about = product_of(np.array([0.0, 1.0, 0.0, 0.0]), quaternion(turn))
         for solid in self.burdens[label].solids:
             middle, half = (solid.low + solid.high) / 2, (solid.high - solid.low) / 2
-            place = down(0.0).T @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
-            boxes.append((place, half, np.array([0.0, 1.0, 0.0, 0.0])))
+            place = down(0.0).T @ turn @ (middle - self.tip[label]) + [0.0, 0.0, STEM]
+            boxes.append((place, half, about))
         return boxes

@@ -182,13 +182,26 @@ def straight_line(
         length: of the lines [m].
         count: number of places on a line.
     """
+    heights = np.linspace(0.0, length, count)
+    return tool_line(chain, q, heights[:, None, None] * np.atleast_2d(way))
+
+
+def tool_line(chain: SerialChain, q: Array, offsets: Array) -> tuple[Array, Truth]:
+    """Configurations (m, k, n) at places of the tool along a line, on which it keeps its
+    orientation, and whether the arm follows the whole line without a jump (m,).
+
+    Args:
+        chain: the arm.
+        q: configurations at the beginnings (m, n) [rad, m].
+        offsets: of the places from the beginning, which is the first (k, 3) or (k, m, 3) [m].
+    """
     place, turn = chain.tool(q)
     rows, good = [np.asarray(q)], np.ones(len(q), bool)
-    for height in np.linspace(0.0, length, count)[1:]:
+    for offset in offsets[1:]:
         ahead = 2 * rows[-1] - rows[-2] if len(rows) > 1 else rows[-1]
-        after, there = descend(chain, place + height * way, turn, ahead, 20)
+        after, there = descend(chain, place + offset, turn, ahead, 20)
         _, inside = nearest_in_range(chain, after, after)
-        good &= there & inside & (np.abs(after - rows[-1]).max(axis=-1) < 5.0 / count)
+        good &= there & inside & (np.abs(after - rows[-1]).max(axis=-1) < 5.0 / len(offsets))
         rows.append(after)
     return np.stack(rows, axis=1), good
 

@@ -131,10 +131,16 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     bare = _layout(cell, {})
     check_room(cell, bare)
     planners = {n: ArmPlanner(cell, n, arm, bare, pace) for n in cell.arms}
-    tours = {
-        n: [_borne(cell, planner, tour, pace) for tour in planner.tours()]
-        for n, planner in planners.items()
-    }
+    tours, small = dict[int, list[ArmTour]](), list[int]()
+    for n, planner in planners.items():
+        tours[n] = []
+        for tour in planner.tours():
+            try:
+                tours[n].append(_borne(cell, planner, tour, pace))
+            except PadTooSmall as error:
+                small.append(error.size)
+    if small:
+        raise PadTooSmall(max(small))
     tours = _paired(tours)
     private = private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
@@ -155,7 +161,7 @@ def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimit
             slow = replace(load, way=tour.brings.stretch(share))
             if slow.is_borne(pace, planner.damping):
                 return replace(tour, grip=grip, brings=slow.way)
-        for size in range(cell.size + 1, len(cell.sizes)):
+        for size in range(cell.size + 1, cell.largest + 1):
             radius = cell.otherwise(size=size).covered(tour.label)
             larger = replace(slow, grip=replace(grip, radius=radius))
             if radius > grip.radius and larger.is_borne(pace, planner.damping):

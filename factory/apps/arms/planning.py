@@ -14,19 +14,21 @@ from factory.api import Array, Diagnostic, Index, Layout, Operation, RunError, m
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM, standing
-from factory.apps.arms.cell import ToolGrip, down
+from factory.apps.arms.cell import ToolGrip, facing
 from factory.apps.arms.certifying import uncertified
 from factory.apps.arms.chain import ConvexBody
-from factory.apps.arms.circuit import candidates, circuit
-from factory.apps.arms.handling import Rise
-from factory.apps.arms.inverse import retreat, straight_line
+from factory.apps.arms.circuit import candidates, circuit, free_candidates
+from factory.apps.arms.holds import facing_up
+from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.obstacles import feeder_name, obstacles, placed_name
 from factory.apps.arms.reach import diagnose_reach
+from factory.apps.arms.rises import Rise
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
+from factory.floor.geometry.turning import about_vertical
 
 YAWS = 8
 """Number of angles at which a part may be held."""
@@ -119,9 +121,9 @@ class ArmPlanner:
             exits = self._line(taken, cell.exits(label), label)
             into = self._line(placed, cell.rises(label), label)
             brings = self._leg(exits, into, label, label, label)
-            tours.append(
-                ArmTour(label, ToolGrip(cell.tip[label], yaw, cell.covered(label)), goes, brings)
-            )
+            normal = cell.burdens[label].hold.normal
+            grip = ToolGrip(cell.tip[label], yaw, cell.covered(label), normal=normal)
+            tours.append(ArmTour(label, grip, goes, brings))
         return tours
 
     def _have(self, operations: Mapping[int | None, Operation]) -> None:
@@ -168,9 +170,10 @@ class ArmPlanner:
 
     def _options(self, label: str, angles: Array) -> tuple[Array, Index]:
         cell = self.cell
-        yaw, burden = cell.stands[self.arm].yaw, cell.burdens[label]
-        taken = np.array([down(float(a) + burden.fed - yaw) for a in angles])
-        turns = np.array([down(float(a) - yaw) for a in angles])
+        burden = cell.burdens[label]
+        faces = np.array([facing(burden.hold.normal, float(a)) for a in angles])
+        turns = self._turn @ faces
+        taken = self._turn @ about_vertical(burden.fed) @ faces
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
         placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto, burden.join))
         self._have({burden.onto: burden.join, burden.source: cell.factory.by_label[label]})
@@ -180,17 +183,32 @@ class ArmPlanner:
         def clearance(q: Array) -> tuple[Array, Index]:
             return self.scene.margins(q, "", CERTAIN_AT_END, spared)
 
-        options = candidates(
+        sought = candidates if cell.is_upright(label) else free_candidates
+        options = sought(
             self.chain,
             (np.tile(shown, (len(angles), 1)), taken),
             (np.tile(placed, (len(angles), 1)), turns),
             clearance,
             np.zeros(len(self.chain)),
-            cell.enters(label).length,
+            self._ends(label),
         )
         if len(options.pairs):
             return options.pairs, options.grips
         raise RunError(self._unreachable(label, (shown, placed), turns[0], options.blocked))
+
+    @cached_property
+    def _turn(self) -> Array:
+        """From the directions of the world to those of the arm's base (3, 3)."""
+        return about_vertical(-self.cell.stands[self.arm].yaw)
+
+    def _ends(self, label: str) -> tuple[list[Array], list[Array]]:
+        """The lines of the tool where it takes something, and where it places it."""
+        cell = self.cell
+        ends = cell.enters(label), cell.exits(label), cell.rises(label), cell.leaves(label)
+        enters, exits, rises, leaves = (rise.places @ self._turn.T for rise in ends)
+        if cell.is_straight(label):  # one of them stands for all
+            return [enters], [enters]
+        return [enters, exits], [rises, leaves]
 
     def _unreachable(
         self, label: str, places: tuple[Array, Array], turn: Array, blocked: NoWay | None
@@ -207,7 +225,8 @@ class ArmPlanner:
         if blocked:
             message += f": {self.scene.say(blocked.pair)} are in each other's way"
         else:
-            message += f" and goes straight up by {rise * 1e3:.0f} mm at both ends"
+            goes = "up" if self.cell.is_straight(label) else "out and up"
+            message += f" and goes straight {goes} by {rise * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
     def _spared_at(self, label: str, loaded: bool = False) -> set[str]:
@@ -242,7 +261,7 @@ class ArmPlanner:
     def _line(self, q: Array, rise: Rise, label: str) -> StraightEnd:
         """The straight line up from a visit."""
         length = rise.length
-        rows, good = straight_line(self.chain, q[None], retreat(self.chain, q[None]), length)
+        rows, good = tool_line(self.chain, q[None], rise.places @ self._turn.T)
         if not good[0]:
             message = f"{self.name} cannot go straight up from '{label}' by {length * 1e3:.0f} mm"
             position = self.cell.factory.by_label[label].position
@@ -269,12 +288,16 @@ class ArmPlanner:
         )
         blocked = way if isinstance(way, NoWay) else None
         if isinstance(way, JointWay):
-            certified = (
+            certified: tuple[tuple[tuple[float, float], set[str], float, bool], ...] = (
                 ((0.0, way.off), first, CERTAIN_AT_END, bool(label)),
                 ((way.off, way.hover), {f"'{label}'", *every}, CERTAIN, True),
                 ((way.hover, way.length), last, CERTAIN_AT_END, False),
             )
             bodies = [*self.chain.bodies, *self._carried(label)]
+            if label and not self.cell.burdens[label].comes[2]:
+                line = self.cell.lines[self.cell.burdens[label].onto].name
+                there = {f"'{label}'", line, *every}
+                certified += (((way.hover, way.length), there, CERTAIN, True),)
             faults = (
                 uncertified(
                     self.chain,
@@ -310,6 +333,7 @@ class ArmPlanner:
         if label:
             burden = self.cell.burdens[label]
             middle = (burden.low + burden.high) / 2 - self.cell.tip[label]
+            middle = facing_up(burden.hold.normal) @ middle
             aside, below = float(np.hypot(*middle[:2])), -float(middle[2])
             half = float(np.linalg.norm(burden.high - burden.low)) / 2
             at = chain.tool_place + chain.tool_turn @ [0.0, 0.0, below]

@@ -186,16 +186,22 @@ def ring_of(chain: SerialChain, low: float, high: float, spread: float = 0.0) ->
     radii = np.arange(STEP, chain.length, STEP) if circle is None else np.array([circle])
     turn = np.diag([1.0, -1.0, -1.0])
     best: Ring | None = None
+    longest = chain.length + 2 * float(chain.spans[0]) * bool(chain.slides[0])
     for base in BASES:
         reached = np.ones(len(radii), bool)
-        for height in (low, (low + high) / 2, high):
+        for height in (low, high, (low + high) / 2):
             places = np.stack([radii, np.zeros_like(radii), np.full_like(radii, height)], axis=1)
             places[:, 2] -= base
-            rows = solutions(chain, places, np.tile(turn, (len(radii), 1, 1)), 16)
-            reached &= [
+            off = np.linalg.norm(places - chain.anchor[0], axis=1)
+            reached &= off <= longest  # beyond that nothing needs to be solved
+            asked = np.flatnonzero(reached)
+            rows = solutions(chain, places[asked], np.tile(turn, (len(asked), 1, 1)), 16)
+            reached[asked] = [
                 bool(len(q)) and float(least_singular_value(chain, q).max()) >= SINGULAR
                 for q in rows
             ]
+            if not reached.any():
+                break
         inner, outer = _longest(reached)
         ring = Ring(base, float(radii[inner]), float(radii[outer]), spread)
         if circle is not None and reached.all():

@@ -23,6 +23,10 @@ HARD = 0.9999
 it, and nothing ever sticks."""
 
 
+LEAST_LEVER = 0.05
+"""A force that is nearer to a hinge than this has no great moment [m]."""
+
+
 class Interference:
     """Disturbs a world. Axes are carriages and lifts, by number; the outfeed is left alone."""
 
@@ -89,8 +93,17 @@ class Interference:
         return float(self._d.qpos[self._axes.qpos[axis]] - setpoint)
 
     def greatest_force(self, axis: int) -> float:
-        """Greatest force of an axis's drive [N]."""
+        """Greatest force of an axis's drive [N], or its moment where that is a hinge [N m]."""
         return float(self._m.actuator_forcerange[self._actuator[axis], 1])
+
+    def thrust(self, axis: int, body: int) -> tuple[Array, float]:
+        """The force on a body (3,) [N], across a hinge, with the greatest moment that the hinge's
+        drive has, and how far from the hinge that is [m]."""
+        d, joint = self._d, int(self._m.dof_jntid[self._dof[axis]])
+        about, off = d.xaxis[joint], d.xipos[body] - d.xanchor[joint]
+        across = np.cross(about, off)
+        lever = max(float(np.linalg.norm(across)), LEAST_LEVER)
+        return across / lever**2 * self.greatest_force(axis), lever
 
     def _hook(self) -> None:
         if not self._hooked:

@@ -24,8 +24,9 @@ class Pushed:
         robot: the robot (index).
         force: ahead along its guidepath, negative backwards [N].
         end: when it ends [s].
-        before: deviation of the robot from its setpoint before the push [m].
+        before: deviation of the robot from its setpoint before the push [m; rad of an arm].
         gave: greatest displacement by it [m].
+        lever: how far it is displaced where it is pushed by a deviation of 1.
     """
 
     robot: int
@@ -33,6 +34,7 @@ class Pushed:
     end: float
     before: float
     gave: float = 0.0
+    lever: float = 1.0
 
 
 class Interventions:
@@ -64,14 +66,20 @@ class Interventions:
 
     def push(self, robot: int, share: float, seconds: float) -> None:
         """Push a robot (index) forwards, to where it delivers, with a `share` of the greatest force
-        of its drive, backwards where that is negative, for so long from now on."""
-        interference = self._condition.interference
-        newtons = share * interference.greatest_force(robot)
-        x, y = self.simulation.layout.guidepaths[robot].heading
+        of its drive, backwards where that is negative, for so long from now on. An arm is pushed at
+        its tool, with a share of the moment of its first joint's drive."""
+        interference, layout = self._condition.interference, self.simulation.layout
+        newtons, lever = share * interference.greatest_force(robot), 1.0
+        x, y = layout.guidepaths[robot].heading
         force, off = (newtons * x, newtons * y, 0.0), interference.off(robot)
-        body = names.carriage(self.simulation.layout.factory.robots[robot].name)
+        body = names.carriage(self._name(robot))
+        if layout.chains is not None and robot in layout.chains.robots:
+            body = names.tool(self._name(robot))
+            most, lever = interference.thrust(robot, self.simulation.physical.m.body(body).id)
+            x, y, z = (share * most).tolist()
+            force, newtons = (x, y, z), newtons / lever
         now = float(self.simulation.world.time)
-        self.pushed = Pushed(robot, newtons, now + seconds, off)
+        self.pushed = Pushed(robot, newtons, now + seconds, off, lever=lever)
         self.strike(Deviation("push", body=body, force=force, seconds=seconds))
         if self._see not in (hooks := self.simulation.world.hooks).before_step:
             hooks.before_step.append(self._see)
@@ -108,7 +116,7 @@ class Interventions:
             world.hooks.before_step.remove(self._see)
             return
         off = self._condition.interference.off(pushed.robot) - pushed.before
-        pushed.gave = max(pushed.gave, abs(off))
+        pushed.gave = max(pushed.gave, pushed.lever * abs(off))
 
     def _name(self, robot: int) -> str:
         return self.simulation.layout.factory.robots[robot].name

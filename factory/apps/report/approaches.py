@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from html import escape
 
 import numpy as np
@@ -60,9 +59,7 @@ def _taken(recording: Recording, operation: Operation) -> Approach:
     assert approach is not None
     if recording.layout is None or approach.kind == "lower" or not any(approach.overlaps):
         return approach
-    side = recording.layout.side(operation)
-    overlaps = approach.overlaps[approach.sides.index(side)]
-    return replace(approach, sides=(side,), overlaps=(overlaps,))
+    return approach.on(recording.layout.side(operation))
 
 
 def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str, float]:

@@ -219,7 +219,7 @@ class Layout(Keeping, Pictured):
         for operation in self.factory.making:
             approach = operation.approach
             if approach is not None and any(approach.overlaps):
-                overlaps += approach.overlaps[approach.sides.index(self.side(operation))]
+                overlaps += approach.on(self.side(operation)).overlaps[0]
         return tuple(overlaps)
 
     def home(self, robot: int, operation: int) -> float:
@@ -246,7 +246,7 @@ class Layout(Keeping, Pictured):
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
         robot = operation.robots[slot]
-        if self.chains and slot == operation.lowered and robot in self.chains.robots:
+        if self.chains and robot in self.chains.robots and label != NOPART:
             return self.chains.standoff(operation.index)
         path = self.guidepaths[robot]
         if slot == operation.lowered and not path.travels:

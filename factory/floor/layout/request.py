@@ -57,6 +57,11 @@ class Ground:
             raise InputError(Diagnostic("BadValue", message, None, "for example (4.0, 3.0)"))
 
     @property
+    def machines(self) -> str:
+        """What the operations on it are coordinated with, in words."""
+        return "hands, magazines and the tray"
+
+    @property
     def reach_bound(self) -> bool:
         """Whether only a layout tells whether a product can be made: robots reach so far and no
         further. On rails they come wherever the rails lead."""

@@ -34,12 +34,14 @@ def matings(
     lifts: bool = True,
     lowered: Mapping[str, str] = MappingProxyType({}),
     as_drawn: bool = False,
+    axes: Mapping[str, int] = MappingProxyType({}),
 ) -> Matings:
     """Judges every operation with two inputs or more, with `lifts` or without. Near-linear in the
     parts, except where very many lie behind one another. `lowered`: by operations the input that is
     to be lowered if it can be, even where it could slide. `as_drawn`: the bodies that collide for
-    parts that are tested as they are drawn are not compared: runs alone need what they overlap."""
-    met = meetings(nodes)
+    parts that are tested as they are drawn are not compared: runs alone need what they overlap.
+    `axes`: by operations the axis along which inputs come that are not tied to a line."""
+    met = meetings(nodes, axes)
     if not met.all:
         return Matings((), {})
     finder = Finder(bodies(product, met.parts), met, as_drawn)

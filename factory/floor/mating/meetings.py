@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
@@ -77,12 +78,13 @@ class Meetings:
         return highest % max(1, len(self.all))
 
 
-def meetings(nodes: Mapping[str, Node]) -> Meetings:
+def meetings(nodes: Mapping[str, Node], axes: Mapping[str, int] = MappingProxyType({})) -> Meetings:
     """The meetings of a product, from its operations in postorder (as `expand` gives them).
 
     The output robot heads along x, so its inputs come along y; what a robot of its own brings is
     made by a robot that heads across; what the carrier holds was made on its own way, and what a
-    manipulator picks on the way on which it is brought.
+    manipulator picks on the way on which it is brought. `axes`: by operations the axis along which
+    inputs come that are not tied to a line.
     """
     spans, parts = _spans(nodes)
     root = next(reversed([*nodes]), "")
@@ -104,7 +106,7 @@ def meetings(nodes: Mapping[str, Node]) -> Meetings:
         for name in node.inputs[1:]:
             borders[spans[name][0] - 1] = len(made)
         split, either = spans[node.inputs[-1]][0], len(node.inputs) == 2 and node.held < 0
-        axis = turns[label]
+        axis = axes.get(label, turns[label])
         meeting = Meeting(label, node.inputs, axis, first, split, end, either, node.position)
         made.append(meeting)
     depths = np.array([levels[m.label] for m in made], np.int64)

@@ -86,6 +86,13 @@ class Approach:
         lowered = self.lowered and name(self.lowered)
         return replace(self, lowered=lowered, overlaps=tuple(overlaps))
 
+    def on(self, side: int) -> Approach:
+        """The same from one of its sides alone; itself where it has only one."""
+        if len(self.sides) == 1:
+            return self
+        overlaps = self.overlaps[self.sides.index(side)]
+        return replace(self, sides=(side,), overlaps=(overlaps,))
+
     def fault(
         self,
         label: str,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from unittest.mock import patch
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.legs import NoWay
 from factory.apps.arms.model import ArmModel
+from factory.apps.live.interventions import Interventions
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.coordinating import with_machines
@@ -162,6 +164,25 @@ def test_what_a_pad_bears_is_in_the_frame_of_its_part() -> None:
     seen = strength._in_bodies(force, np.array([True, False]), np.array([weld, weld]))[..., 0]
     assert seen.tolist() == [[0.0, -10.0, 0.0, 1.0, 2.0, 3.0], [0.0, 0.0, -10.0, 1.0, 2.0, 3.0]]
     assert force[0, 1, 0] == 0.0
+
+
+@pytest.mark.parametrize("share", [0.4, -0.4])
+def test_a_push_of_an_arm_is_at_its_tool(share: float) -> None:
+    """With the moment about its first joint that its drive has a share of; that joint gives way."""
+    simulation = Simulation(cell("six"), RunRequest(units=1))
+    world, interventions = simulation.physical, Interventions(simulation)
+    m, d = world.m, world.d
+    mujoco.mj_forward(m, d)
+    interventions.push(1, share, 0.3)
+    pushed = interventions.pushed
+    assert pushed is not None and abs(pushed.force) < 150.0 * abs(share) / 0.2
+    for _ in range(5):
+        simulation.supervisor.step()
+    tool, joint = m.body("r2/tool").id, m.joint("r2/pan").id
+    force, off = d.xfrc_applied[tool, :3], d.xipos[tool] - d.xanchor[joint]
+    assert np.cross(off, force)[2] == pytest.approx(share * 150.0, rel=0.02)
+    assert force @ off == pytest.approx(0.0, abs=0.05 * np.linalg.norm(force))
+    assert 1e-4 < pushed.gave < 0.1
 
 
 def test_check_lays_a_cell_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

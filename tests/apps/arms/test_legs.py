@@ -10,7 +10,7 @@ import pytest
 
 from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, partners
+from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, free_candidates, partners
 from factory.apps.arms.inverse import (
     SINGULAR,
     least_singular_value,
@@ -23,6 +23,7 @@ from factory.apps.arms.legs import CHECKS, NoWay, leg, line, obstruction, transf
 from tests.arm_models import PACE, ball, down, nothing, shipped
 
 LEFT, RIGHT = np.array([0.2, 0.38, 0.15]), np.array([0.2, -0.38, 0.15])
+UP = ([np.linspace(0.0, 0.085, 25)[:, None] * [0.0, 0.0, 1.0]],) * 2
 
 
 def visit(chain: SerialChain, place: Array) -> Array:
@@ -136,7 +137,7 @@ def test_candidates_are_clear_and_what_is_not_is_named() -> None:
     chain = shipped("six")
     near = np.array([0.0, 0.3, 1.9, -0.6, -1.57, 0.0])
     takes, puts = poses(LEFT, 4), poses(RIGHT, 4)
-    every = candidates(chain, takes, puts, nothing, near, 0.085)
+    every = candidates(chain, takes, puts, nothing, near, UP)
     assert every.blocked is None and len(every.pairs) == every.reached >= 16
     for k, (place, turn) in enumerate((takes, puts)):
         at, now = chain.tool(every.pairs[:, k])
@@ -144,15 +145,31 @@ def test_candidates_are_clear_and_what_is_not_is_named() -> None:
         assert np.abs(now - turn[every.grips]).max() < 1e-8
     for k in (0, 1):
         clearance = ball(chain, chain.frames(every.pairs[0, k])[0][3], 0.05)
-        some = candidates(chain, takes, puts, clearance, near, 0.085)
+        some = candidates(chain, takes, puts, clearance, near, UP)
         assert 0 < len(some.pairs) < some.reached == every.reached and some.blocked is not None
         visits = some.pairs.reshape(-1, 6)
         above = straight_line(chain, visits, retreat(chain, visits), 0.085)[0][:, -1]
         assert min(clearance(visits)[0].min(), clearance(above)[0].min()) >= 0.0
-    none = candidates(chain, takes, puts, ball(chain, LEFT, 0.3), near, 0.085)
+    none = candidates(chain, takes, puts, ball(chain, LEFT, 0.3), near, UP)
     assert len(none.pairs) == 0 and none.blocked is not None and none.blocked.depth > 0.0
-    far = candidates(chain, poses(np.array([2.0, 0, 0]), 2), poses(RIGHT, 2), nothing, near, 0.1)
+    far = candidates(chain, poses(np.array([2.0, 0, 0]), 2), poses(RIGHT, 2), nothing, near, UP)
     assert far.reached == 0 and far.blocked is None and far.pairs.shape == (0, 2, 6)
+
+
+def test_free_candidates_pair_any_branches() -> None:
+    """They have those on one branch, and others; each is at both poses, and clear."""
+    chain = shipped("six")
+    near = np.array([0.0, 0.3, 1.9, -0.6, -1.57, 0.0])
+    takes, puts = poses(LEFT, 2), poses(RIGHT, 2)
+    same = candidates(chain, takes, puts, nothing, near, UP)
+    free = free_candidates(chain, takes, puts, nothing, near, UP)
+    assert free.blocked is None and len(free.pairs) > len(same.pairs)
+    for k, (place, turn) in enumerate((takes, puts)):
+        at, now = chain.tool(free.pairs[:, k])
+        assert np.abs(at - place[free.grips]).max() < 1e-8
+        assert np.abs(now - turn[free.grips]).max() < 1e-8
+    none = free_candidates(chain, takes, puts, ball(chain, RIGHT, 0.3), near, UP)
+    assert len(none.pairs) == 0 and none.reached == 2 and none.blocked is not None
 
 
 @pytest.mark.parametrize("seed", range(5))

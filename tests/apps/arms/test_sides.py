@@ -1,0 +1,117 @@
+"""Parts that come to their places from a side: how they are held, their ends, and a cell."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from factory.api import Array, Layout
+from factory.apps.arms.arming import from_one_side
+from factory.apps.arms.holds import facing_up, holds
+from factory.apps.arms.rises import BEND, Rise
+from tests.arm_cells import chains, project, run
+
+DRAWER = """root = chest;
+chest = mate ( case, drawer );
+case = mate ( block, roof );
+block = atomic ( box = (0.05, 0.06, 0.05), pos = (-0.025, 0, 0.025) );
+roof = atomic ( box = (0.1, 0.06, 0.008), pos = (0, 0, 0.0542) );
+drawer = atomic ( box = (0.045, 0.05, 0.03), pos = (0.0227, 0, 0.03) )"""
+"""A block with a roof that reaches beyond it, and what comes from a side to its place below."""
+
+
+BOX = (
+    DRAWER.replace("roof );", "roof, wall1, wall2 );")
+    + """;
+wall1 = atomic ( box = (0.1, 0.006, 0.05), pos = (0, -0.0342, 0.025) );
+wall2 = atomic ( box = (0.1, 0.006, 0.05), pos = (0, 0.0342, 0.025) )"""
+)
+"""The same with walls, between which it comes from one side alone."""
+
+
+@cache
+def drawer() -> Layout:
+    """Its cell."""
+    return project(DRAWER, "six").layout
+
+
+@pytest.mark.parametrize("along", [(1.0, 0.0), (0.0, -1.0)])
+def test_an_end_goes_to_a_side_and_then_up(along: tuple[float, float]) -> None:
+    way = np.array([*along, 0.0])
+    rise = Rise.beside(way, 0.1, 0.08)
+    places = rise.places
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    assert not places[0].any() and steps.sum() == pytest.approx(rise.length, abs=1e-4)
+    assert np.ptp(steps) < 1e-4
+    aside, up = places @ way, places[:, 2]
+    assert not up[aside < 0.1 - 1e-9].any()  # level as far as was asked for
+    assert np.allclose(aside[up > BEND], 0.1 + BEND)
+    gone = np.linspace(0.0, rise.length, len(places))
+    assert up[gone >= rise.straight].min() >= 0.08 - 0.006
+    assert np.allclose(places, np.outer(aside, way) + np.outer(up, [0.0, 0.0, 1.0]))
+
+
+@pytest.mark.parametrize("normal", [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1)])
+def test_a_pad_is_on_the_face_that_it_is_asked_for(normal: tuple[float, ...]) -> None:
+    solids, out = project(DRAWER, "six").product.solids, np.array(normal, float)
+    turn = facing_up(out)
+    assert np.allclose(turn @ turn.T, np.eye(3)) and np.linalg.det(turn) == pytest.approx(1.0)
+    (hold,) = holds([solids["drawer"]], [solids["block"], solids["roof"]], np.zeros(3), out)
+    part = solids["drawer"]
+    off = out @ (hold.pad.at - part.low) if out.sum() < 0 else out @ (hold.pad.at - part.high)
+    assert off == pytest.approx(1e-4) and hold.pad.level
+    assert hold.clear == (normal not in ((0, 0, 1), (-1, 0, 0)))
+
+
+@pytest.mark.parametrize(("text", "axis", "sides"), [(DRAWER, 1, (-1, 1)), (BOX, 0, (1,))])
+def test_a_part_comes_along_the_axis_that_is_clear(
+    text: str, axis: int, sides: tuple[int, ...]
+) -> None:
+    made = project(text, "six")
+    approach = made.approaches["chest"]
+    assert (approach.kind, approach.axis, approach.sides) == ("slide", axis, sides)
+    factory = from_one_side(made.compiled)
+    chosen = factory.by_label["chest"].approach
+    assert chosen is not None and chosen.sides == (1,) and not chosen.overlaps[0]
+    assert factory.by_label["case"].lowered >= 0
+
+
+def boxes(layout: Layout, label: str, off: Array) -> tuple[Array, Array]:
+    """The box of a part that is off its place (..., 3)."""
+    solid = layout.product.solids[label]
+    return solid.low + off, solid.high + off
+
+
+def test_what_comes_from_a_side_meets_nothing_on_its_way() -> None:
+    """By the boxes of its parts; at its end it moves along one axis."""
+    layout = drawer()
+    told, factory = chains(layout), layout.factory
+    leaf = factory.by_label["drawer"].index
+    leg = told.curves.legs[told.row(factory.parents[leaf], 1)]
+    tip, turn = leg.chain.tool(leg.way.at(np.linspace(0.0, leg.way.length, 4000))[0])
+    stand = told.stands[1]
+    c, s = np.cos(stand.yaw), np.sin(stand.yaw)
+    world = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    off = (tip - tip[-1]) @ world.T
+    held = world @ turn[-1] @ [0.0, 0.0, 1.0]
+    assert told.grips["drawer"].normal[2] == 0.0
+    assert np.allclose(held, -told.grips["drawer"].normal, atol=1e-8)
+    near = np.abs(off).max(axis=1) < 0.06
+    assert near.sum() > 100
+    assert np.abs(off[near] @ (np.eye(3) - np.abs(np.outer(held, held)))).max() < 2e-5
+    low, high = boxes(layout, "drawer", off)
+    for other in ("block", "roof"):
+        least, most = boxes(layout, other, np.zeros(3))
+        apart = np.maximum(low - most, least - high).max(axis=1)
+        assert apart.min() > 1e-4
+
+
+def test_a_cell_brings_a_part_from_a_side() -> None:
+    made = run(drawer(), units=2, jitter=0.3, seed=5)
+    assert made.succeeded and made.refines_net and made.products == 2
+    physics = made.physics
+    assert physics is not None and physics.unintended_contacts == 0
+    assert 0.0 < physics.handoff_gap_max_mm <= 0.1
+    assert physics.product_error_max_mm is not None and physics.product_error_max_mm <= 0.01
