@@ -10,7 +10,7 @@ from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Operation, RunError, Solid
+from factory.api import Array, Diagnostic, Operation, Point2, RunError, Solid
 from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.cell import Well, well_of
@@ -20,7 +20,7 @@ from factory.apps.arms.lines import LANE, Line, overlap
 from factory.apps.arms.reach import Ring, ring_of
 from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.guidepath import Box, Point2, hull
+from factory.floor.layout.guidepath import Box, hull
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from factory.api import Factory, Layout, Product, Project, Settings, usage_error
+from factory.api import Factory, Ground, Layout, Product, Project, Settings, usage_error
 from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import ArmModel
-from factory.floor.layout.request import Ground
 
 
 @dataclass(frozen=True, slots=True)

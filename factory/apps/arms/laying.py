@@ -18,9 +18,11 @@ from factory.api import (
     Diagnostic,
     Factory,
     Guidepath,
+    Hand,
     Layout,
     Product,
     RunError,
+    payload_boxes,
 )
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import with_tool
@@ -48,9 +50,7 @@ from factory.floor.layout.certificate import (
     Region,
 )
 from factory.floor.layout.dimensions import PAYLOADS
-from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.leaving import homes
-from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import Visit, visits_of
 
 ASIDE = 0.0, 1.2, 1.8

@@ -12,12 +12,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from factory.api import Array, Factory, Guidepath, Layout, Operation, Product
+from factory.api import Array, Factory, Guidepath, Hand, Layout, Operation, Point2, Product
 from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.certificate import PAYLOAD_BODY, Region
 from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
-from factory.floor.layout.guidepath import Box, Point2, hull, moved
-from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.guidepath import Box, hull, moved
 
 LANE = 0.32
 """From the station to either end of a line, without the length of what it carries [m]."""
