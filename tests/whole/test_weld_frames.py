@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from factory.apps.monitor.anatomy import check_holders
-from factory.engine.mjcf.weld_frames import SHALLOW, WeldFrames, gaps, held_at, joints_of
+from factory.engine.mjcf.weld_frames import WeldFrames, chain_of, gaps, held_at
 from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.arm_models import random_arm
@@ -69,7 +69,7 @@ def test_frames_at_the_end_of_long_chains_follow_from_their_joints(seed: int) ->
         weld.name1, weld.name2 = name, f"part{number}"
         weld.data[:11] = [0, 0, 0, 0.1, -0.2, 0.3, 0.5, 0.5, -0.5, 0.5, 1]
     m = spec.compile()
-    if len(joints_of(m, m.body("hand").id)) <= SHALLOW:
+    if not chain_of(m, m.body("hand").id):
         pytest.skip("the chain is short")
     d, draw = mujoco.MjData(m), np.random.default_rng(seed)
     joints = [j for j in range(m.njnt) if m.jnt_type[j] != mujoco.mjtJoint.mjJNT_FREE]
@@ -88,17 +88,18 @@ def test_frames_at_the_end_of_long_chains_follow_from_their_joints(seed: int) ->
             assert min(np.abs(turned - turn).max(), np.abs(turned + turn).max()) < 1e-12
 
 
-def test_a_holder_that_turns_is_refused() -> None:
+def test_a_holder_with_a_joint_of_another_kind_is_refused() -> None:
     xml = """<mujoco><worldbody>
       <body name="slider"><joint type="slide"/><geom size="0.1"/>
         <body name="arm"><joint type="{}" axis="1 0 0"/><geom size="0.1"/></body></body>
       <body name="part"><freejoint/><geom size="0.1"/></body>
     </worldbody><equality><weld body1="arm" body2="part"/></equality></mujoco>"""
-    check_holders(mujoco.MjModel.from_xml_string(xml.format("slide")), np.array([0]))
-    turns = mujoco.MjModel.from_xml_string(xml.format("hinge"))
-    check_holders(turns, np.array([], int))
+    for kind in ("slide", "hinge"):
+        check_holders(mujoco.MjModel.from_xml_string(xml.format(kind)), np.array([0]))
+    rolls = mujoco.MjModel.from_xml_string(xml.format("ball"))
+    check_holders(rolls, np.array([], int))
     with pytest.raises(ValueError, match="arm holds parts and does more than slide"):
-        check_holders(turns, np.array([0]))
+        check_holders(rolls, np.array([0]))
 
 
 def test_a_holder_that_turns_about_the_vertical_turns_what_it_holds() -> None:
