@@ -1,7 +1,7 @@
 """A cell: a carrier's line with an arm beside it, and the arm's feeders on a circle round its base.
 
-The carrier always stops at the same station. The arm takes each part from a feeder of its own, in
-which it rises from below, and lowers it onto what the carrier brings.
+The carrier stops at one station, or near it if the tool of the arm stays on a circle. The arm takes
+each part from a feeder of its own, in which it rises from below, and places it on the product.
 """
 
 from __future__ import annotations
