@@ -7,8 +7,9 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from factory.api import Array, Index
+from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import Clearance
 from factory.apps.arms.read import MODELS, chain_of, read_chain
@@ -30,6 +31,20 @@ def down(yaw: float) -> Array:
     """The orientation of a tool that points down, turned about the vertical."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+
+
+def straight_line(
+    chain: SerialChain, q: Array, way: Array, length: float, count: int = 25
+) -> tuple[Array, Truth]:
+    """Configurations (m, count, n) at equal distances along straight lines of the tool [m] in
+    directions (3,) or (m, 3), and whether the arm follows each (m,)."""
+    heights = np.linspace(0.0, length, count)
+    return tool_line(chain, q, heights[:, None, None] * np.atleast_2d(way))
+
+
+def retreat(chain: SerialChain, q: Array) -> Array:
+    """The directions (..., 3) in which the tool leaves what it is at: against its z."""
+    return -chain.tool(q)[1][..., :, 2]
 
 
 def random_arm(seed: int) -> str:

@@ -119,8 +119,7 @@ class Arrangement(Handling):
         if not self.ring.is_circle:
             return steps
         for label, burden in self.burdens.items():
-            stops = {burden.onto: burden.join, burden.source: self.factory.by_label[label]}
-            if line.carrier in stops:
+            if line.carrier in burden.stops:
                 place = self.tip[label][:2] - self.product.middle[:2] + line.station
                 x, y = (place - self.stands[self.arm_of[label]].place[:2]).tolist()
                 if abs(y) >= self.ring.outer:
@@ -129,7 +128,7 @@ class Arrangement(Handling):
                     message += f" {1e3 * self.ring.outer:.0f} mm"
                     raise RunError(Diagnostic("Unreachable", message, burden.join.position, RAILS))
                 along = copysign(sqrt(self.ring.outer**2 - y**2), x)
-                steps[stops[line.carrier].index] = along - x
+                steps[burden.stops[line.carrier].index] = along - x
         return steps
 
     def _span(self, line: Line) -> Box:
@@ -309,8 +308,9 @@ class Arrangement(Handling):
     def shown(self, label: str) -> Array:
         """How far from its place in the product's frame what an arm brings is as the arm takes it
         (3,) [m]."""
-        if (source := self.burdens[label].source) is not None:
-            return self.placed(source, self.factory.by_label[label])
+        burden = self.burdens[label]
+        if burden.source is not None:
+            return self.placed(burden.source, burden.takes)
         well = self.wells[label]
         return np.array([*well.place, well.elevation]) - self._foot
 

@@ -25,7 +25,8 @@ class Burden:
         product: that has them.
         source: the carrier (index) that it is taken from; None for a part from a feeder.
         onto: the carrier (index) on which it is placed.
-        join: the operation in which it is.
+        takes: the operation in which it is taken.
+        join: that in which it is placed.
         there: the parts that it is placed onto.
     """
 
@@ -34,6 +35,7 @@ class Burden:
     product: Product
     source: int | None
     onto: int
+    takes: Operation
     join: Operation
     there: frozenset[str]
 
@@ -73,6 +75,11 @@ class Burden:
     def fed(self) -> float:
         """Angle about the vertical by which it is turned where it is taken [rad]."""
         return self.solids[0].fed if self.source is None else 0.0
+
+    @property
+    def stops(self) -> dict[int | None, Operation]:
+        """By carriers (index) the operation in which an arm places it on that, or takes it."""
+        return {self.onto: self.join, self.source: self.takes}
 
     @property
     def held(self) -> str:
@@ -117,4 +124,4 @@ def burden_of(factory: Factory, product: Product, first: int) -> Burden:
     source = next((robot for robot in takes.robots if robot != takes.carrier), None)
     parts = factory.contents[takes.label]
     there = frozenset(factory.contents[join.pile])
-    return Burden(takes.label, tuple(parts), product, source, join.carrier, join, there)
+    return Burden(takes.label, tuple(parts), product, source, join.carrier, takes, join, there)

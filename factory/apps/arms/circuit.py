@@ -84,19 +84,14 @@ def candidates(
         near: a configuration; of those that whole turns make equal, the nearest is used [rad, m].
         ends: the lines of the tool at either, as the offsets of places from there (l, 3) [m].
     """
-    every = solutions(chain, *takes)
-    grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
-    q, good = nearest_in_range(chain, np.concatenate(every), near)
+    q, good, grips = _reaching(chain, takes, near)
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
     joined &= good
     grips, q, other = grips[joined], q[joined], other[joined]
-    follows, asked = np.ones(len(q), bool), [q, other]
-    for start, lines in zip((q, other), ends, strict=True):
-        for offsets in lines:
-            rows, good = tool_line(chain, start, offsets)
-            follows &= good
-            asked.append(rows[:, -1])
-    margin, pair = _asked(clearance, asked, follows)
+    there, goes = _with_ends(chain, q, ends[0])
+    here, comes = _with_ends(chain, other, ends[1])
+    follows = goes & comes
+    margin, pair = _asked(clearance, [*there, *here], follows)
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
     blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
@@ -114,16 +109,10 @@ def free_candidates(
     """As `candidates`, but with two configurations that need not be on one branch, of which each is
     away from singular ones."""
     visits, blocked, reached = list[tuple[Array, Index]](), list[NoWay](), 0
-    for (places, turns), lines in zip((takes, puts), ends, strict=True):
-        every = solutions(chain, places, turns)
-        grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
-        q, good = nearest_in_range(chain, np.concatenate(every), near)
-        good &= least_singular_value(chain, q) >= SINGULAR
-        asked = [q]
-        for offsets in lines:
-            rows, follows = tool_line(chain, q, offsets)
-            good &= follows
-            asked.append(rows[:, -1])
+    for poses, lines in zip((takes, puts), ends, strict=True):
+        q, good, grips = _reaching(chain, poses, near)
+        asked, follows = _with_ends(chain, q, lines)
+        good &= follows & (least_singular_value(chain, q) >= SINGULAR)
         reached += int(good.any())
         margin, pair = _asked(clearance, asked, good)
         clear = margin.min(axis=0, initial=np.inf) >= 0.0
@@ -135,6 +124,27 @@ def free_candidates(
     after, inside = nearest_in_range(chain, other[j], one[i])
     pairs = np.stack([one[i], after], axis=1)[inside]
     return Candidates(pairs, first[i][inside], reached, blocked[0] if blocked else None)
+
+
+def _reaching(
+    chain: SerialChain, poses: tuple[Array, Array], near: Array
+) -> tuple[Array, Truth, Index]:
+    """The configurations (k, n) that come to m poses, whether all joints are within their limits
+    (k,), and the number of each one's pose (k,)."""
+    every = solutions(chain, *poses)
+    grips = np.repeat(np.arange(len(every)), [len(q) for q in every])
+    return *nearest_in_range(chain, np.concatenate(every), near), grips
+
+
+def _with_ends(chain: SerialChain, q: Array, lines: Sequence[Array]) -> tuple[list[Array], Truth]:
+    """Configurations (m, n) with those at the far ends of lines of the tool from there, and whether
+    the arm follows all lines (m,)."""
+    places, follows = [q], np.ones(len(q), bool)
+    for offsets in lines:
+        rows, good = tool_line(chain, q, offsets)
+        follows &= good
+        places.append(rows[:, -1])
+    return places, follows
 
 
 def _asked(clearance: Clearance, places: Sequence[Array], which: Truth) -> tuple[Array, Index]:

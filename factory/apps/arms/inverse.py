@@ -169,23 +169,6 @@ def least_singular_value(chain: SerialChain, q: Array) -> Array:
     return np.asarray(np.linalg.svd(scaled, compute_uv=False)[..., -1])
 
 
-def straight_line(
-    chain: SerialChain, q: Array, way: Array, length: float, count: int = 25
-) -> tuple[Array, Truth]:
-    """Configurations (m, count, n) at equal distances along straight lines of the tool, which keeps
-    its orientation, and whether the arm follows the whole line without a jump (m,).
-
-    Args:
-        chain: the arm.
-        q: configurations at the beginnings (m, n) [rad, m].
-        way: direction in the base frame, a unit vector (3,) or (m, 3).
-        length: of the lines [m].
-        count: number of places on a line.
-    """
-    heights = np.linspace(0.0, length, count)
-    return tool_line(chain, q, heights[:, None, None] * np.atleast_2d(way))
-
-
 def tool_line(chain: SerialChain, q: Array, offsets: Array) -> tuple[Array, Truth]:
     """Configurations (m, k, n) at places of the tool along a line, on which it keeps its
     orientation, and whether the arm follows the whole line without a jump (m,).
@@ -204,14 +187,3 @@ def tool_line(chain: SerialChain, q: Array, offsets: Array) -> tuple[Array, Trut
         good &= there & inside & (np.abs(after - rows[-1]).max(axis=-1) < 5.0 / len(offsets))
         rows.append(after)
     return np.stack(rows, axis=1), good
-
-
-def retreat(chain: SerialChain, q: Array) -> Array:
-    """The directions (..., 3) in the base frame in which the tool leaves what it is at: against its
-    z.
-
-    Args:
-        chain: the arm.
-        q: configurations (..., n) [rad, m].
-    """
-    return -chain.tool(q)[1][..., :, 2]

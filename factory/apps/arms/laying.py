@@ -258,7 +258,7 @@ def _layout(
             well = cell.wells[label]
             place, elevation = well.place, well.elevation
         else:
-            place, elevation = cell.lines[burden.source].stand(factory.by_label[label]), 0.0
+            place, elevation = cell.lines[burden.source].stand(burden.takes), 0.0
         shift = place[0] - at[0], place[1] - at[1]
         visits[key] = Visit(visits[key].at, 0.0, 0.0, elevation, shift)
     for t in every:

@@ -127,8 +127,10 @@ class ArmPlanner:
         return tours
 
     def _have(self, operations: Mapping[int | None, Operation]) -> None:
-        """Have carriers stand where they do in operations, by their indices."""
+        """Have carriers, by index, stand where they do in operations, if that is not one place."""
         for carrier, line in self.cell.lines.items():
+            if not line.steps:
+                continue
             x, y = line.stand(operations.get(carrier))
             parts = {placed_name(part, line) for part in line.rails.product.solids}
             self.scene.move(parts, (x - line.station[0], y - line.station[1], 0.0))
@@ -176,7 +178,7 @@ class ArmPlanner:
         taken = self._turn @ about_vertical(burden.fed) @ faces
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
         placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto, burden.join))
-        self._have({burden.onto: burden.join, burden.source: cell.factory.by_label[label]})
+        self._have(burden.stops)
         at, under = self._spared_at(label), self._spared_under(label)
         spared = (at & under) | ((at | under) - self._moving)  # parts count that do at either end
 
@@ -273,8 +275,8 @@ class ArmPlanner:
     ) -> JointWay:
         """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
         scene, every = self.scene, self._moving
-        after_, before_ = self.cell.burdens[after], self.cell.burdens[before]
-        self._have({before_.onto: before_.join, after_.source: self.cell.factory.by_label[after]})
+        left, taken_next = self.cell.burdens[before], self.cell.burdens[after]
+        self._have({left.onto: left.join, taken_next.source: taken_next.takes})
         taken, pile = self._spared_at(after, bool(label)), self._spared_under(before)
         first, last = (taken, pile) if label else (pile, taken)
         way = leg(

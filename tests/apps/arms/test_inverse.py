@@ -14,13 +14,11 @@ from factory.apps.arms.inverse import (
     descend,
     least_singular_value,
     nearest_in_range,
-    retreat,
     seeds,
     solutions,
-    straight_line,
 )
 from factory.apps.arms.reach import Unreachable, diagnose_reach
-from tests.arm_models import both, configurations, down, shipped
+from tests.arm_models import both, configurations, down, retreat, shipped, straight_line
 
 ARMS = ("six", "scara")
 

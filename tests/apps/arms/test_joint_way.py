@@ -10,7 +10,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.inverse import retreat, solutions, straight_line
+from factory.apps.arms.inverse import solutions
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.slowness import (
     box_average,
@@ -19,7 +19,16 @@ from factory.apps.arms.slowness import (
     tool_shares,
     way_through,
 )
-from tests.arm_models import ANY_TOOL_SPEED, PACE, configurations, down, random_way, shipped
+from tests.arm_models import (
+    ANY_TOOL_SPEED,
+    PACE,
+    configurations,
+    down,
+    random_way,
+    retreat,
+    shipped,
+    straight_line,
+)
 
 REFERENCES, STEPS, STEP = 200, 300, 0.005
 

@@ -14,13 +14,11 @@ from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, free_can
 from factory.apps.arms.inverse import (
     SINGULAR,
     least_singular_value,
-    retreat,
     solutions,
-    straight_line,
 )
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.legs import CHECKS, NoWay, leg, line, obstruction, transfer
-from tests.arm_models import PACE, ball, down, nothing, shipped
+from tests.arm_models import PACE, ball, down, nothing, retreat, shipped, straight_line
 
 LEFT, RIGHT = np.array([0.2, 0.38, 0.15]), np.array([0.2, -0.38, 0.15])
 UP = ([np.linspace(0.0, 0.085, 25)[:, None] * [0.0, 0.0, 1.0]],) * 2
