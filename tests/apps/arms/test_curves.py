@@ -247,6 +247,26 @@ def test_a_part_that_is_held_turned_is_turned(angle: float) -> None:
     assert np.abs(held - turn.reshape(3, 3)).max() < 1e-9
 
 
+def test_what_is_moved_is_in_the_way_where_it_is_then() -> None:
+    """And what is not, where it was; moves are from where all stood first."""
+    stand, low, by = Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS), (0.3, -0.1, 0.0), (0.05, 0.02, 0.0)
+    boxes = [
+        StandingBox(name, (x, y, z), (x + 0.1, y + 0.1, z + 0.3))
+        for name, (x, y, z) in (("pile", low), ("post", (-0.3, 0.3, 0.0)))
+    ]
+    there = StandingBox("pile", (0.35, -0.08, 0.0), (0.45, 0.02, 0.3))
+    q = configurations(shipped("six"), 40, 3)
+    scene, other = scene_of(stand, tuple(boxes)), scene_of(stand, (there, boxes[1]))
+    first = scene.margins(q, "", 0.0, ())[0]
+    for _ in range(2):
+        scene.move({"pile"}, by)
+    margin = scene.margins(q, "", 0.0, ())[0]
+    assert np.abs(margin - other.margins(q, "", 0.0, ())[0]).max() < 1e-12
+    assert np.abs(margin - first).max() > 1e-3
+    scene.move({"pile"}, (0.0, 0.0, 0.0))
+    assert (scene.margins(q, "", 0.0, ())[0] == first).all()
+
+
 def test_margins_are_those_of_all_pairs() -> None:
     """Against the engine's distances of every pair, none left out."""
     rng = np.random.default_rng(7)

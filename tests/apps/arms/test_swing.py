@@ -12,6 +12,7 @@ import pytest
 from factory.apps.arms import laying
 from factory.apps.arms.orders import PrivateParts, private_parts
 from factory.apps.arms.reach import circle_of
+from factory.apps.arms.scene import Scene
 from tests.arm_cells import SMALL, cell, chains, project, refusal, run
 from tests.arm_models import shipped
 from tests.paths import EXAMPLES, ROOT
@@ -47,6 +48,22 @@ def test_it_makes_products(arm: str, units: int) -> None:
     assert 0.0 < physics.handoff_gap_max_mm <= 0.05
     if made.cycle_time_s:
         assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
+
+
+def test_ways_are_planned_round_the_pile_where_the_carrier_stands() -> None:
+    """For each part elsewhere; the arm's coordinate grows towards the feeder, behind."""
+    moved, move = list[float](), Scene.move
+
+    def seen(scene: Scene, parts: set[str], by: tuple[float, float, float]) -> None:
+        moved.append(by[0])
+        move(scene, parts, by)
+
+    with patch.object(Scene, "move", seen):
+        layout = project(SMALL, SWING).layout
+    joins = [o for o in layout.factory.making if len(o.inputs) == 2]
+    stops = [layout.visits[o.index, o.carrier].at for o in joins]
+    assert len({*moved}) == len({*stops}) == 2
+    assert max(moved) - min(moved) == pytest.approx(max(stops) - min(stops))
 
 
 @pytest.mark.slow
