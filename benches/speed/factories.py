@@ -7,6 +7,7 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
 
+from benches.fidelity.products import EXAMPLES
 from factory.engine.record.verdict import RunVerdict, judged, kept_figures
 from factory.engine.simulation.mujoco.courses import Course
 from factory.engine.simulation.request import RunRequest
@@ -89,14 +90,22 @@ def laid_out(text: str, settings: Settings = DEFAULT) -> Layout:
 class Case:
     """A factory in MuJoCo that is neither filmed nor logged: so many robots or one more, the
     engine's timestep [s] (None: that of DEFAULT), units let in at once (None: any number), whether
-    parts that are joined become one body, and how many units it makes from the empty factory (None:
-    it is measured in steady production)."""
+    parts that are joined become one body, how many units it makes from the empty factory (None: it
+    is measured in steady production), and the example that it makes (None: a balanced product)."""
 
     robots: int
     timestep: float | None
     wip: int | None = None
     fuse: bool = False
     units: int | None = None
+    example: str | None = None
+
+    def layout(self) -> Layout:
+        """Its factory on its floor."""
+        if self.example is None:
+            return laid_out(robots_at_least(self.robots))
+        plan = read(EXAMPLES / f"{self.example}.pag").plain
+        return Ground().lay_out(plan, product_geometry(plan.pag), DEFAULT)
 
     def simulation(self, layout: Layout, shown: bool = False) -> Simulation:
         """A run of it, ready to go; `shown` as in a RunRequest."""

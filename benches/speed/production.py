@@ -13,9 +13,7 @@ from benches.speed.factories import (
     Case,
     Steady,
     judge,
-    laid_out,
     produce,
-    robots_at_least,
     run_in,
     run_until,
 )
@@ -64,11 +62,13 @@ def work(
     wip: int | None = None,
     fuse: bool = False,
     units: int | None = None,
+    example: str | None = None,
     window: float | None = None,
 ) -> dict[str, Any]:
     """A case: `units` from the empty factory, or in steady production a `window` [s], one cycle
     where None."""
-    case, layout = Case(robots, timestep, wip, fuse, units), laid_out(robots_at_least(robots))
+    case = Case(robots, timestep, wip, fuse, units, example)
+    layout = case.layout()
     simulation = case.simulation(layout)
     if units is not None:
         return measured(simulation, partial(produce, simulation, units))

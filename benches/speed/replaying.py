@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass, field
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -89,8 +89,8 @@ def same(one: Any, other: Any) -> bool:
 
 @dataclass(frozen=True)
 class Floor:
-    """Seconds for the same window, the factory's run loop and the bare replay; since when and until
-    when [s], and the engine's timestep [s]."""
+    """Processor seconds for the same window, the factory's run loop and the bare replay; since when
+    and until when [s], and the engine's timestep [s]."""
 
     since: float
     until: float
@@ -111,9 +111,9 @@ def measure_floor(case: Case, layout: Layout, window: float) -> Floor:
     recorder = Recorder(world.m, world.d)
     world.motion.stepping.step = recorder.step  # type: ignore[attr-defined]
     _go(recorded, case.units, since + window)
-    begin = perf_counter()
+    begin = process_time()
     _go(timed, case.units, since + window)
-    run = perf_counter() - begin
+    run = process_time() - begin
     judge(timed)
     m, d = recorder.begin
     bare = replay(m, d, recorder.writes)
@@ -131,12 +131,12 @@ def _go(simulation: Simulation, units: int | None, until: float) -> None:
 
 
 def replay(m: mujoco.MjModel, d: mujoco.MjData, writes: list[tuple[list[Write], int]]) -> float:
-    """Seconds to write and step."""
+    """Processor seconds to write and step."""
     flat = [array.reshape(-1) for array in arrays(m, d)]
     step = mujoco.mj_step
-    begin = perf_counter()
+    begin = process_time()
     for written, steps in writes:
         for number, at, values in written:
             flat[number][at] = values
         step(m, d, steps)
-    return perf_counter() - begin
+    return process_time() - begin

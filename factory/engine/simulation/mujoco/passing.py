@@ -120,7 +120,9 @@ class Passing:
         axes alone are `moving`. One whose hand must be there first delivers its part before that:
         the end of an operation tells."""
         (x, v), first, carriers = self._at(), self._first[numbers], self._carriers[numbers]
-        goes = np.isin(carriers, moving) & ~(first & self.holds[numbers])
+        moves = np.zeros(len(self._axes), bool)
+        moves[moving] = True
+        goes = moves[carriers] & ~(first & self.holds[numbers])
         ways = np.where(first, self._home[numbers] - HOME - x[numbers], (x - self._clear)[numbers])
         speeds = np.where(first, v[numbers], -v[numbers])
         least = self._fastest.least(np.maximum(ways[goes], 0.0), np.maximum(speeds[goes], 0.0))
