@@ -12,11 +12,11 @@ import numpy as np
 
 from factory.api import Array, Diagnostic, Operation, Point2, RunError, Solid
 from factory.apps.arms.arming import RAILS
-from factory.apps.arms.body import PEDESTAL, Stand
+from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.handling import Handling
-from factory.apps.arms.lines import LANE, Line, overlap
+from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal, wrist
 from factory.apps.arms.reach import Ring, ring_of
 from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
@@ -39,10 +39,6 @@ TURN, CIRCLES = 0.04, 4
 
 WRIST_BACK = 0.2
 """How far an arm's wrist is behind the tip of its tool, about [m]."""
-
-BEHIND, BESIDE = 0.3, 0.07
-"""How far the wrist of an arm reaches behind the tip of a tool that lies level, and how far beside
-it [m]."""
 
 FAR_OFF = 9.0
 """Longer than any line [m]."""
@@ -104,7 +100,7 @@ class Arrangement(Handling):
         lines = dict[int, Line]()
         for carrier, draft in self.drafts.items():
             if carrier:
-                line = self._beside(draft, [*map(self._span, lines.values())])
+                line = self._beside(draft, [*lines.values()])
             else:
                 line = replace(draft, station=self.station, ahead=self.lane)
             steps = self._steps(line)
@@ -138,26 +134,49 @@ class Arrangement(Handling):
         room = APART if line.carrier else 0.0
         ahead = x + line.ahead + line.extent[1] + room
         boxes = [(x - FAR_OFF, ahead, y + low - room, y + high + room)]
-        for label, burden in self.burdens.items():
-            if line.carrier in (burden.onto, burden.source) and not self.is_upright(label):
-                at = np.array(line.station) + (self.tip[label] - self.product.middle)[:2]
-                boxes.append(_wrist(at, burden.hold.normal))
+        for label in self._from_sides(line):
+            at = np.array(line.station) + (self.tip[label] - self.product.middle)[:2]
+            boxes.append(wrist(at, self.burdens[label].hold.normal))
         return hull(boxes)
 
-    def _beside(self, line: Line, taken: Sequence[Box]) -> Line:
-        """A line where it is clear of others."""
-        stand, radius = self.stands[self.arms[0]], self.round
-        taken = [*taken, pedestal(stand)]
+    def _from_sides(self, line: Line) -> list[str]:
+        """What an arm holds from a side where it places it on a line, or takes it from there."""
+        carrier, burdens = line.carrier, self.burdens.values()
+        there = [burden.label for burden in burdens if carrier in (burden.onto, burden.source)]
+        return [label for label in there if not self.is_upright(label)]
+
+    def _beside(self, line: Line, others: Sequence[Line]) -> Line:
+        """A line where it is clear of others. Raises RunError (Layout)."""
+        arm, radius, least = self.arms[0], self.round, (FAR_OFF, "")
+        stand, (u, v) = self.stands[arm], line.off
+        taken = {f"the line of {other.name}": self._span(other) for other in others}
+        taken[f"the base of {self.factory.robots[arm].name}"] = pedestal(stand)
         for angle in np.arange(TURN, FULL, TURN).tolist():
             x, y, _ = stand.place
             turned = stand.yaw - angle
-            u, v = line.off
             at = x + radius * cos(turned) - u, y + radius * sin(turned) - v
             placed = replace(line, station=(round(at[0], 6), round(at[1], 6)))
-            if not any(overlap(self._span(placed), box) for box in taken):
+            span = self._span(placed)
+            worst = max((depth(span, box), name) for name, box in taken.items())
+            if worst[0] <= 0.0:
                 return placed
-        message = f"the line of {line.name} has no room at its arm"
-        raise RunError(Diagnostic("Layout", message, None, f"smaller parts; {RAILS}"))
+            least = min(least, worst)
+        raise RunError(self._no_room(line, *least))
+
+    def _no_room(self, line: Line, near: float, name: str) -> Diagnostic:
+        """Says that a line would be so much too near to something at best [m]."""
+        (pile,) = (b.takes for b in self.burdens.values() if b.source == line.carrier)
+        _, _, low, high = self._span(line)
+        label = pile.label.partition("/")[0]
+        message = (
+            f"the line of {line.name}, on which '{label}' is built, has no room at its arm: it is"
+            f" {1e3 * (high - low):.0f} mm wide and at best {1e3 * near:.0f} mm too near to {name}"
+        )
+        hint = f"fewer sub-assemblies, smaller parts; {RAILS}"
+        if sides := self._from_sides(line):
+            message += f"; the arm has its wrist beside it for {', '.join(map(repr, sides))}"
+            hint = f"parts that are lowered, or held on top; {hint}"
+        return Diagnostic("Layout", message, pile.position, hint)
 
     @cached_property
     def ring(self) -> Ring:
@@ -283,7 +302,7 @@ class Arrangement(Handling):
         """What a feeder takes, and an arm that takes from it behind its tool [m]."""
         if self.is_upright(label):
             return well.feeder.housing
-        return hull([well.feeder.housing, _wrist(*self._face(label, well))])
+        return hull([well.feeder.housing, wrist(*self._face(label, well))])
 
     def _face(self, label: str, well: Well) -> tuple[Array, Array]:
         """Where an arm's tool is on a part in its feeder (2,) [m], and the normal there (2,)."""
@@ -329,21 +348,3 @@ class Arrangement(Handling):
 
 SIDES = (1.0, -1.0)
 """The sides of the line on which arms stand."""
-
-
-def pedestal(stand: Stand) -> Box:
-    """The square round a pedestal [m]."""
-    x, y, _ = stand.place
-    return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
-
-
-def _wrist(at: Array, normal: Array) -> Box:
-    """What an arm takes behind a tool whose tip is at a place, on a face with a normal that lies
-    level [m]."""
-    x, y = np.stack([at, at + BEHIND * normal[:2]]).T
-    return (
-        float(x.min()) - BESIDE,
-        float(x.max()) + BESIDE,
-        float(y.min()) - BESIDE,
-        float(y.max()) + BESIDE,
-    )

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from factory.api import Array, Factory, Guidepath, Hand, Layout, Operation, Point2, Product
+from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.certificate import PAYLOAD_BODY, Region
 from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
@@ -23,6 +24,10 @@ LANE = 0.32
 
 NEAREST = 0.03
 """Least distance of a carrier behind the product's middle [m]."""
+
+BEHIND, BESIDE = 0.3, 0.07
+"""How far the wrist of an arm reaches behind the tip of a tool that lies level, and how far beside
+it [m]."""
 
 STEP = 0.02
 """Between the stations that are tried for a tool, and least distance of what stands [m]."""
@@ -226,8 +231,26 @@ def line_of(factory: Factory, carrier: int, product: Product, rails: Layout) -> 
 
 def overlap(one: Box, other: Box) -> bool:
     """Whether two boxes overlap."""
-    across = one[0] < other[1] and other[0] < one[1]
-    return across and one[2] < other[3] and other[2] < one[3]
+    return depth(one, other) > 0.0
+
+
+def depth(one: Box, other: Box) -> float:
+    """How far one of two boxes that overlap must move to be clear of the other, less than 0 for how
+    far apart two others are [m]."""
+    return min(one[1] - other[0], other[1] - one[0], one[3] - other[2], other[3] - one[2])
+
+
+def pedestal(stand: Stand) -> Box:
+    """The square round a pedestal [m]."""
+    x, y, _ = stand.place
+    return x - PEDESTAL, x + PEDESTAL, y - PEDESTAL, y + PEDESTAL
+
+
+def wrist(at: Array, normal: Array) -> Box:
+    """What an arm takes behind a tool whose tip is at a place, on a face with a normal that lies
+    level [m]."""
+    (x, y), (u, v) = at[:2].tolist(), (at + BEHIND * normal[:2]).tolist()
+    return min(x, u) - BESIDE, max(x, u) + BESIDE, min(y, v) - BESIDE, max(y, v) + BESIDE
 
 
 def upright(name: str, box: Box, low: float, high: float) -> StandingBox:

@@ -3,6 +3,7 @@ leave."""
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from unittest.mock import patch
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 from factory.api import Array, InputError, Project, names
-from factory.apps.arms import obstacles, planning
+from factory.apps.arms import arrangement, obstacles, planning
 from factory.apps.arms.arming import armed, on_rails
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.orders import BEYOND
@@ -175,6 +176,26 @@ def test_eight_sub_assemblies_have_no_room() -> None:
     whole = f"p = mate ( a, {', '.join(f's{n}' for n in range(8))} )"
     why = refusal(";\n".join(["root = p", whole, *joins, base, *parts]))
     assert why.code in ("Layout", "Unreachable") and "rails" in why.hint
+
+
+def test_a_line_without_room_says_how_much_is_missing() -> None:
+    """Where a block with a drawer is built, beside a pedestal as wide as the cell."""
+    text = """root = p;
+p = mate ( a, s ); s = mate ( t, d ); t = mate ( b, c );
+a = atomic ( box = (0.12, 0.1, 0.02), pos = (0, 0, 0.01) );
+b = atomic ( box = (0.05, 0.06, 0.05), pos = (-0.025, 0, 0.0451) );
+c = atomic ( box = (0.1, 0.06, 0.008), pos = (0, 0, 0.0743) );
+d = atomic ( box = (0.045, 0.05, 0.03), pos = (0.0227, 0, 0.0501) )"""
+    with patch.object(arrangement, "pedestal", lambda stand: (-9.0, 9.0, -9.0, 9.0)):
+        why = refusal(text)
+    assert why.code == "Layout" and why.position is not None and why.position.line == 2
+    told = (
+        r"the line of r2, on which 's' is built, has no room at its arm: it is (\d+) mm wide and"
+        r" at best \d+ mm too near to the base of r3; the arm has its wrist beside it for 'd'"
+    )
+    wide = re.fullmatch(told, why.message)
+    assert wide is not None and int(wide[1]) > 300, why.message
+    assert why.hint.startswith("parts that are lowered")
 
 
 def test_a_part_that_is_presented_turned_is_turned_back() -> None:
