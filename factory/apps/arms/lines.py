@@ -235,8 +235,8 @@ def overlap(one: Box, other: Box) -> bool:
 
 
 def depth(one: Box, other: Box) -> float:
-    """How far one of two boxes that overlap must move to be clear of the other, less than 0 for how
-    far apart two others are [m]."""
+    """How far one of two boxes must move along an axis to be clear of the other; less than 0 where
+    they are apart [m]."""
     return min(one[1] - other[0], other[1] - one[0], one[3] - other[2], other[3] - one[2])
 
 
