@@ -30,6 +30,7 @@ from factory.theory.lang.recovery import (
     learn,
     open_grammar,
     report_unlawful,
+    tokens_of,
 )
 from factory.theory.lang.source import Findings, quoted
 from factory.theory.lang.statements import (
@@ -97,7 +98,7 @@ def _lessons() -> Mapping[tuple[object, str], Lesson]:
 def _lex(text: str) -> list[Token]:
     """All tokens of a text, vectors taken apart."""
     tokens: list[Token] = []
-    for token in _lark().lex(text):
+    for token in tokens_of(_lark(), text):
         tokens.extend(_apart(token) if token.type == "VECTOR" else (token,))
     return tokens
 
