@@ -49,6 +49,7 @@ from factory.theory.lang.statements import (
 from factory.theory.lang.words import UNITS
 
 _SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")
+_WORD = re.compile(r"[^\s=(),]+")
 _SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA"}
 
 
@@ -70,6 +71,10 @@ class _Builder(Transformer[Token, Any]):
     def definition(self, label: Token | CopiedLabel, operation: Token, *rest: Any) -> Definition:
         places = rest[-1] if rest and isinstance(rest[-1], PlaceList) else None
         arguments = rest[0] if rest and rest[0] is not places else ()
+        return Definition(label, operation, arguments, places)
+
+    def plain(self, whole: Token, places: PlaceList | None = None) -> Definition:
+        label, operation, *arguments = _apart(whole, _WORD)
         return Definition(label, operation, arguments, places)
 
     def permission(self, word: Token, *words: Token) -> Permission:
@@ -96,20 +101,20 @@ def _lessons() -> Mapping[tuple[object, str], Lesson]:
 
 
 def _lex(text: str) -> list[Token]:
-    """All tokens of a text, vectors taken apart."""
+    """All tokens of a text, those of several signs taken apart."""
     tokens: list[Token] = []
     for token in tokens_of(_lark(), text):
-        tokens.extend(_apart(token) if token.type == "VECTOR" else (token,))
+        tokens.extend(_apart(token) if token.type in ("VECTOR", "PLAIN") else (token,))
     return tokens
 
 
-def _apart(token: Token) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )`, which is one token of the lexer."""
-    for match in _SIGN_OR_WORD.finditer(token):
-        kind = _SIGNS.get(match[0], "WORD")
-        offset = match.start()
-        start, column = (token.start_pos or 0) + offset, (token.column or 1) + offset
-        yield Token(kind, match[0], start, token.line, column, token.line, column + len(match[0]))
+def _apart(whole: Token, signs: re.Pattern[str] = _SIGN_OR_WORD) -> Iterator[Token]:
+    """The tokens of `= ( 0, 0, 1 )` or `a = mate ( b, c )`, which are one token of the lexer: all
+    signs and words, or only its words."""
+    start, line, column = whole.start_pos or 0, whole.line, whole.column or 1
+    for match in signs.finditer(whole):
+        kind, (begin, end) = _SIGNS.get(match[0], "WORD"), match.span()
+        yield Token(kind, match[0], start + begin, line, column + begin, line, column + end)
 
 
 def spelled(token: Token) -> Vector:
