@@ -48,9 +48,9 @@ from factory.theory.lang.statements import (
 )
 from factory.theory.lang.words import UNITS
 
-_SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")
-_WORD = re.compile(r"[^\s=(),]+")
-_SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA"}
+_SIGN_OR_WORD = re.compile(r"[\n=(),;]|[^\s=(),;]+")
+_WORD = re.compile(r"[\n;]|[^\s=(),;]+")
+_SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA", ";": "SEMICOLON"}
 
 
 @v_args(inline=True)
@@ -73,9 +73,16 @@ class _Builder(Transformer[Token, Any]):
         arguments = rest[0] if rest and rest[0] is not places else ()
         return Definition(label, operation, arguments, places)
 
-    def plain(self, whole: Token, places: PlaceList | None = None) -> Definition:
-        label, operation, *arguments = _apart(whole, _WORD)
-        return Definition(label, operation, arguments, places)
+    def definitions(self, run: Token, places: PlaceList | None = None) -> list[Definition]:
+        pieces: list[list[Token]] = [[]]
+        for token in _apart(run, _WORD):
+            if token == ";":
+                pieces.append([])
+            else:
+                pieces[-1].append(token)
+        made = [Definition(label, operation, words) for label, operation, *words in pieces]
+        made[-1] = made[-1]._replace(places=places)
+        return made
 
     def permission(self, word: Token, *words: Token) -> Permission:
         return Permission(word, words)
@@ -109,12 +116,16 @@ def _lex(text: str) -> list[Token]:
 
 
 def _apart(whole: Token, signs: re.Pattern[str] = _SIGN_OR_WORD) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )` or `a = mate ( b, c )`, which are one token of the lexer: all
-    signs and words, or only its words."""
-    start, line, column = whole.start_pos or 0, whole.line, whole.column or 1
+    """The tokens of `= ( 0, 0, 1 )`, or of definitions, which are one token of the lexer: all signs
+    and words, or only its words and semicolons."""
+    start, line, left = whole.start_pos or 0, whole.line or 1, -(whole.column or 1)
     for match in signs.finditer(whole):
-        kind, (begin, end) = _SIGNS.get(match[0], "WORD"), match.span()
-        yield Token(kind, match[0], start + begin, line, column + begin, line, column + end)
+        text, (begin, end) = match[0], match.span()
+        if text == "\n":
+            line, left = line + 1, end - 1
+        else:
+            kind = _SIGNS.get(text, "WORD")
+            yield Token(kind, text, start + begin, line, begin - left, line, end - left)
 
 
 def spelled(token: Token) -> Vector:
@@ -137,6 +148,9 @@ def read_statements(findings: Findings) -> Statements:
 
 def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     """Add a statement to its list; `pair` and `equation` may still turn out to be malformed."""
+    if isinstance(statement, list):
+        made.definitions += statement
+        return
     if isinstance(statement, Definition):
         made.definitions.append(statement)
         return
