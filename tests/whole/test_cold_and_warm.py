@@ -20,6 +20,7 @@ import rich.table
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lark import Lark
 from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
 from rich.console import Console
@@ -40,7 +41,8 @@ from factory.support import console as console_module
 from factory.support.cache import load, store
 from factory.support.errors import one_line
 from factory.support.files import user_cache
-from factory.theory.lang import load_pag
+from factory.theory.lang import load_pag, pag_syntax
+from factory.theory.lang.recovery import open_grammar
 from factory.theory.nets.components import strong_components
 from tests.command_line import Terminal
 
@@ -106,6 +108,16 @@ def imported(*words: object, cache: Path) -> set[str]:
 
 
 # --- nothing new --------------------------------------------------------------------------------
+
+
+def test_the_tables_of_a_grammar_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def read() -> Any:
+        parser = open_grammar("pag.lark", ["start", "unlawful"], pag_syntax._Builder())
+        return parser.parse("root = s; s = mate ( a, b ); a = atomic ( mass = 1 )", start="start")
+
+    first = read()
+    monkeypatch.setattr(Lark, "__init__", None)
+    assert read() == first
 
 
 def test_a_second_check_measures_no_mesh_and_seeks_no_overlap(
@@ -263,7 +275,8 @@ def test_boxes_are_checked_without_libraries_of_meshes(tmp_path: Path, cache: Pa
     (tmp_path / "boxes.pag").write_text(BOXES)
     found = imported("check", tmp_path / "boxes.pag", cache=cache)
     assert "numpy" in found and not found & set(ENGINES)
-    assert not cache.exists()  # what is computed at once is not kept
+    kept = [folder.name for folder in cache.iterdir()]
+    assert kept == ["grammars"]  # what is computed at once is not kept
 
 
 def test_meshes_that_are_known_are_checked_without_libraries(file: Path, cache: Path) -> None:

@@ -24,7 +24,7 @@ from factory.theory.plant.factory import NO_PARENT, Factory
 from factory.theory.plant.gripping import with_closing
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
-from factory.theory.problem.ids import OperationId, PlaceId, RobotId
+from factory.theory.problem.ids import OperationId, PlaceId, RobotId, TransitionId, end_of
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import NOBODY, Plan, in_turn, out_of_turn
 from factory.theory.problem.robot_types import LIFT, Catalogue
@@ -37,14 +37,24 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     as `r2:part1`. The empty-handed waits of a robot with several tours are told apart by the
     operation to come, `r2:nopart/part3`.
     """
+    net, redistribution, gears, slots = _wired(robots, operations)
+    initial = tuple(gear.places[0] for gear in gears)
+    return GearNet(ThreadedNet(net, redistribution), gears, initial, slots)
+
+
+def _wired(
+    robots: Sequence[Robot], operations: Sequence[Operation]
+) -> tuple[PetriNet, tuple[Redistribution, ...], tuple[Gear, ...], tuple[tuple[RobotId, ...], ...]]:
+    """The net of `gear_net`, its redistribution functions, its gears, and its slots."""
     transitions = tuple(
         Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
     )
+    numbers = [(TransitionId(event),) for event in range(len(transitions))]  # each made once
     places = [
         Place(
             o.label,
-            (o.start,),
-            (o.end,),
+            numbers[o.start],
+            numbers[o.end],
             o.template.name,
             "" if o.after[o.template.carrier - 1] == NOPART else o.label,
             len(o.robots),
@@ -53,41 +63,42 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
         for o in operations
     ]
     slots = [o.robots for o in operations]
-    slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
+    acting: list[list[Slot]] = [[(o.place, i) for i in range(len(o.robots))] for o in operations]
     pairs: list[list[tuple[Slot, Slot]]] = [[] for _ in transitions]
     gears = []
     for robot in robots:
-        gear_places, gear_events = [], []
-        held = [operations[n].before[slot_of[n][robot.index]] for n in robot.operations]
+        gear_places, gear_events, alone = [], [], (robot.index,)
+        roles = [operations[n].robots.index(robot.index) for n in robot.operations]
+        held = [operations[n].before[i] for n, i in zip(robot.operations, roles, strict=True)]
         several = held.count(NOPART) > 1
-        for step, number in enumerate(robot.operations):
-            before, operation = operations[robot.operations[step - 1]], operations[number]
-            done, begun = before.end, operation.start
-            slot = slot_of[number][robot.index]
-            label = operation.before[slot]
+        for step, (number, slot, label) in enumerate(
+            zip(robot.operations, roles, held, strict=True)
+        ):
+            last, operation = robot.operations[step - 1], operations[number]
+            (done,), (begun,) = numbers[end_of(last)], numbers[operation.start]
             is_one_of = several and label == NOPART
             stays = label != NOPART and operation.after[slot] != NOPART
             wait = PlaceId(len(places))
             places.append(
                 Place(
                     f"{robot.name}:{label}" + (f"/{operation.label}" if is_one_of else ""),
-                    (done,),
-                    (begun,),
+                    numbers[done],
+                    numbers[begun],
                     "hold" if stays else "wait",
                     label,
                     1,
                     operation.position,
                 )
             )
-            slots.append((robot.index,))
-            pairs[begun].append(((wait, 0), (operation.place, slot)))
-            pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
+            slots.append(alone)
+            waiting = (wait, 0)
+            pairs[begun].append((waiting, acting[number][slot]))
+            pairs[done].append((acting[last][roles[step - 1]], waiting))
             gear_places += [wait, operation.place]
             gear_events += [done, begun]
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
-    redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
-    net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
-    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))
+    net, redistribution = PetriNet(transitions, tuple(places)), [tuple(sorted(p)) for p in pairs]
+    return net, tuple(redistribution), tuple(gears), tuple(slots)
 
 
 def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:

@@ -31,6 +31,7 @@ from factory.theory.problem.template import Template
 DROPOFF = "dropoff"
 
 
+@collector_paused()
 def compile_pag(
     pag: PAG,
     templates: Mapping[str, Template],
@@ -53,7 +54,8 @@ def compile_pag(
         return beside(
             pag, [compile_pag(x, templates, catalogue, approaches, plan) for x in products]
         )
-    return compile_nodes(pag, expand(pag, templates, plan), templates, catalogue, approaches, plan)
+    made = _allocated(pag, expand(pag, templates, plan), templates, catalogue, approaches)
+    return _composed(pag, *made, plan)
 
 
 @collector_paused()
@@ -67,6 +69,21 @@ def compile_nodes(
 ) -> Factory:
     """The factory with these operations, which make the product `pag`. Raises InputError as
     `compile_pag` does."""
+    return _composed(pag, *_allocated(pag, nodes, templates, catalogue, approaches), plan)
+
+
+Allocated = tuple[tuple[Robot, ...], tuple[Operation, ...], tuple[OperationId, ...]]
+"""Robots, operations and their parents."""
+
+
+def _allocated(
+    pag: PAG,
+    nodes: dict[str, Node],
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach],
+) -> Allocated:
+    """The robots of the operations that make a product. Raises InputError."""
     output = templates[DROPOFF]
     _check_types(nodes, output, catalogue)
     draft = _Draft(nodes, catalogue, approaches)
@@ -79,10 +96,20 @@ def compile_nodes(
     ]
     if troubles:
         raise InputError(troubles)
-    net, parents = gear_net(robots, operations), tuple(draft.parents)
-    return Factory(
-        pag, robots, operations, net, parents, replace(plan, turns=(), lifts=None, names=())
-    )
+    return robots, operations, tuple(draft.parents)
+
+
+def _composed(
+    pag: PAG,
+    robots: tuple[Robot, ...],
+    operations: tuple[Operation, ...],
+    parents: tuple[OperationId, ...],
+    plan: Plan,
+) -> Factory:
+    """The factory of these robots: nothing else of their allocation is kept while its net, which
+    takes most, is made."""
+    net, made = gear_net(robots, operations), replace(plan, turns=(), lifts=None, names=())
+    return Factory(pag, robots, operations, net, parents, made)
 
 
 def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalogue) -> None:

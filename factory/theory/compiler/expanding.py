@@ -50,8 +50,9 @@ def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN)
     nodes: dict[str, Node] = {}
     for assembly in pag.postorder():
         for label, template, inputs, last in _operations(assembly, templates, plan.forms):
-            inputs = tuple(_brought(nodes, template, inputs, templates))
-            size, dwell = 1 + sum(nodes[x].size for x in inputs), _dwell(template, assembly)
+            if template.brought:
+                inputs = tuple(_brought(nodes, template, inputs, templates))
+            size, dwell = 1 + sum([nodes[x].size for x in inputs]), _dwell(template, assembly)
             nodes[label] = Node(label, template, inputs, dwell, size, assembly.position, last)
     nodes = _in_postorder(nodes, pag.root) if plan.forms else nodes
     return handed_over(nodes, plan.relays, templates)

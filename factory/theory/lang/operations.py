@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
+from sys import intern
 from types import MappingProxyType
 from typing import TypeGuard
 
@@ -127,9 +128,9 @@ class AssemblyReader:
         if entry is None or not entry.inputs:
             inputs = [token for token in inputs if not is_number(token)]
         return Assembly(
-            str(label),
-            str(operation),
-            tuple([str(token) for token in inputs]),
+            intern(str(label)),
+            intern(str(operation)),
+            tuple([intern(str(token)) for token in inputs]),
             self._parameters(entry, keywords) if entry and keywords else (),
             at(label),
             tuple([at(token) for token in inputs]),

@@ -30,6 +30,7 @@ from factory.theory.lang.recovery import (
     learn,
     open_grammar,
     report_unlawful,
+    tokens_of,
 )
 from factory.theory.lang.source import Findings, quoted
 from factory.theory.lang.statements import (
@@ -47,8 +48,9 @@ from factory.theory.lang.statements import (
 )
 from factory.theory.lang.words import UNITS
 
-_SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")
-_SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA"}
+_SIGN_OR_WORD = re.compile(r"[\n=(),;]|[^\s=(),;]+")
+_WORD = re.compile(r"[\n;]|[^\s=(),;]+")
+_SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA", ";": "SEMICOLON"}
 
 
 @v_args(inline=True)
@@ -70,6 +72,17 @@ class _Builder(Transformer[Token, Any]):
         places = rest[-1] if rest and isinstance(rest[-1], PlaceList) else None
         arguments = rest[0] if rest and rest[0] is not places else ()
         return Definition(label, operation, arguments, places)
+
+    def definitions(self, run: Token, places: PlaceList | None = None) -> list[Definition]:
+        pieces: list[list[Token]] = [[]]
+        for token in _apart(run, _WORD):
+            if token == ";":
+                pieces.append([])
+            else:
+                pieces[-1].append(token)
+        made = [Definition(label, operation, words) for label, operation, *words in pieces]
+        made[-1] = made[-1]._replace(places=places)
+        return made
 
     def permission(self, word: Token, *words: Token) -> Permission:
         return Permission(word, words)
@@ -95,20 +108,24 @@ def _lessons() -> Mapping[tuple[object, str], Lesson]:
 
 
 def _lex(text: str) -> list[Token]:
-    """All tokens of a text, vectors taken apart."""
+    """All tokens of a text, those of several signs taken apart."""
     tokens: list[Token] = []
-    for token in _lark().lex(text):
-        tokens.extend(_apart(token) if token.type == "VECTOR" else (token,))
+    for token in tokens_of(_lark(), text):
+        tokens.extend(_apart(token) if token.type in ("VECTOR", "PLAIN") else (token,))
     return tokens
 
 
-def _apart(token: Token) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )`, which is one token of the lexer."""
-    for match in _SIGN_OR_WORD.finditer(token):
-        kind = _SIGNS.get(match[0], "WORD")
-        offset = match.start()
-        start, column = (token.start_pos or 0) + offset, (token.column or 1) + offset
-        yield Token(kind, match[0], start, token.line, column, token.line, column + len(match[0]))
+def _apart(whole: Token, signs: re.Pattern[str] = _SIGN_OR_WORD) -> Iterator[Token]:
+    """The tokens of `= ( 0, 0, 1 )`, or of definitions, which are one token of the lexer: all signs
+    and words, or only its words and semicolons."""
+    start, line, left = whole.start_pos or 0, whole.line or 1, -(whole.column or 1)
+    for match in signs.finditer(whole):
+        text, (begin, end) = match[0], match.span()
+        if text == "\n":
+            line, left = line + 1, end - 1
+        else:
+            kind = _SIGNS.get(text, "WORD")
+            yield Token(kind, text, start + begin, line, begin - left, line, end - left)
 
 
 def spelled(token: Token) -> Vector:
@@ -131,6 +148,9 @@ def read_statements(findings: Findings) -> Statements:
 
 def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     """Add a statement to its list; `pair` and `equation` may still turn out to be malformed."""
+    if isinstance(statement, list):
+        made.definitions += statement
+        return
     if isinstance(statement, Definition):
         made.definitions.append(statement)
         return

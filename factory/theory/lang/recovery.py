@@ -7,13 +7,18 @@ that stops it in the same state at the same kind gets the message of that lesson
 
 from __future__ import annotations
 
+import sys
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
 from typing import Any, Literal
 
+import lark
 from lark import Lark, Token, Transformer, UnexpectedToken
 
+from factory.support.cache import digest, load, store
 from factory.theory.lang.source import Findings, quoted
 
 END = "$END"
@@ -46,40 +51,55 @@ class Lesson:
 
 
 def open_grammar(name: str, start: list[str], builder: Transformer[Token, Any]) -> Lark:
-    """The parser of a grammar in this folder; `builder` transforms its rules during the parse."""
-    return Lark.open(
-        name,
-        rel_to=__file__,
+    """The parser of a grammar in this folder; `builder` transforms its rules during the parse. Its
+    tables take longer to make than most texts to read: they are kept in the user's cache."""
+    grammar = Path(__file__).with_name(name).read_text("utf-8")
+    entry = digest(grammar, start, type(builder), lark.__version__, sys.version_info)
+    kept = load("grammars", entry)
+    if kept is not None:
+        return Lark.load(BytesIO(kept))
+    parser = Lark(
+        grammar,
         parser="lalr",
         lexer="basic",
         start=start,
         transformer=builder,
         maybe_placeholders=False,
     )
+    tables = BytesIO()
+    parser.save(tables)
+    store("grammars", entry, tables.getvalue())
+    return parser
 
 
-def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
+def tokens_of(parser: Lark, text: str) -> Iterator[Token]:
+    """The tokens of a text, by the lexer that the parser has made already."""
+    parse = parser.parse_interactive(text, start=parser.options.start[0])
+    yield from parse.lexer_thread.lex(parse.parser_state)  # type: ignore[no-untyped-call]
+
+
+def drive(parser: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
     """The value of tokens parsed from the symbol `start`, or where the parse stopped."""
-    parser = lark.parse_interactive(None, start=start)
+    parse = parser.parse_interactive(None, start=start)
     last = tokens[-1] if tokens else Token(END, "", 0, 1, 1)
     result: Any = None
     for index, token in enumerate([*tokens, Token.new_borrow_pos(END, "", last)]):
         try:
-            result = parser.feed_token(token)
+            result = parse.feed_token(token)
         except UnexpectedToken as error:
-            accepted = frozenset(parser.accepts())  # type: ignore[no-untyped-call]
+            accepted = frozenset(parse.accepts())  # type: ignore[no-untyped-call]
             return Stuck(index, token, error.state.position, accepted)
     return result
 
 
 def learn(
-    lark: Lark, start: str, lessons: Iterable[Lesson], lex: Callable[[str], list[Token]]
+    parser: Lark, start: str, lessons: Iterable[Lesson], lex: Callable[[str], list[Token]]
 ) -> Mapping[tuple[object, str], Lesson]:
     """The lessons by the state of the parser and the kind of token at which it stops."""
     table: dict[tuple[object, str], Lesson] = {}
     for lesson in lessons:
         for example in lesson.examples.split(" | ") if lesson.examples else ():
-            stuck = drive(lark, start, lex(example))
+            stuck = drive(parser, start, lex(example))
             if not isinstance(stuck, Stuck):
                 raise ValueError(f"the example {example!r} is well formed")
             table.setdefault((stuck.state, stuck.token.type), lesson)

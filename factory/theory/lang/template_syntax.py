@@ -14,7 +14,15 @@ from typing import Any, NamedTuple
 from lark import Lark, Token, Transformer, v_args
 
 from factory.support.errors import did_you_mean
-from factory.theory.lang.recovery import END, UNLAWFUL, Stuck, drive, open_grammar, report_unlawful
+from factory.theory.lang.recovery import (
+    END,
+    UNLAWFUL,
+    Stuck,
+    drive,
+    open_grammar,
+    report_unlawful,
+    tokens_of,
+)
 from factory.theory.lang.source import Findings, quoted, where
 from factory.theory.lang.statements import Vector
 
@@ -122,7 +130,7 @@ def _lark() -> Lark:
 def read_clauses(findings: Findings) -> TemplateDraft:
     """The clauses of a text; its syntax errors go to `findings`."""
     draft, source = TemplateDraft(), findings.source
-    tokens = list(_lark().lex(source.text))
+    tokens = list(tokens_of(_lark(), source.text))
     hint = f"a template starts: {HEADER}"
     if not tokens:
         findings.add("Syntax", "there is no template: the text is empty", source.start(), hint)

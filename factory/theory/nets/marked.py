@@ -75,11 +75,18 @@ class MarkedNet(Pictured):
     @cached_property
     def owners(self) -> tuple[tuple[int, ...], ...]:
         """For each place the gears through it, as indices."""
-        owners: list[list[int]] = [[] for _ in self.net.places]
+        owners: list[tuple[int, ...]] = [()] * len(self.net.places)
+        shared: dict[int, list[int]] = {}
         for number, gear in enumerate(self.gears):
+            alone = (number,)
             for place in gear.places:
-                owners[place].append(number)
-        return tuple(map(tuple, owners))
+                if owners[place]:
+                    shared.setdefault(place, [*owners[place]]).append(number)
+                else:
+                    owners[place] = alone
+        for several, gears in shared.items():
+            owners[several] = tuple(gears)
+        return tuple(owners)
 
     def fire(self, tokens: MutableSequence[int], event: int) -> None:
         """Move the tokens of a transition, whether or not it is enabled."""
