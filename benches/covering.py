@@ -18,12 +18,11 @@ import sqlite3
 import subprocess
 import sys
 import tomllib
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Generator, Mapping, Sequence
 from math import inf
 from pathlib import Path
 from time import process_time
 
-import coverage
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -57,19 +56,20 @@ class Contexts:
     that of the processes that it has started [s]."""
 
     def __init__(self) -> None:
+        import coverage  # of the extra `dev`
+
         FOLDER.mkdir(parents=True, exist_ok=True)
-        own = f"{os.environ.get('PYTEST_XDIST_WORKER', 'main')}"
-        self._coverage = coverage.Coverage(
-            data_file=str(FOLDER / f"{own}.coverage"), source=["factory"], branch=True
-        )
-        self._times, self._seen = FOLDER / f"{own}.times", 0
+        name = os.environ.get("PYTEST_XDIST_WORKER", "main")
+        file = str(FOLDER / f"{name}.coverage")
+        self._coverage = coverage.Coverage(data_file=file, source=["factory"], branch=True)
+        self._times, self._seen = FOLDER / f"{name}.times", 0
         self._coverage.start()
 
     @pytest.hookimpl(wrapper=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
         self._coverage.switch_context(item.nodeid)
         begin, children = process_time(), os.times().children_user
-        yield
+        result = yield
         own, started = process_time() - begin, os.times().children_user - children
         self._coverage.switch_context("")
         with self._times.open("a", encoding="utf-8") as file:
@@ -77,6 +77,7 @@ class Contexts:
         self._seen += 1
         if self._seen % OFTEN == 0:
             self._coverage.save()
+        return result
 
     def pytest_unconfigure(self) -> None:
         self._coverage.stop()
