@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -123,10 +124,12 @@ class Passing:
         moves = np.zeros(len(self._axes), bool)
         moves[moving] = True
         goes = moves[carriers] & ~(first & self.holds[numbers])
+        if not goes.any():
+            return inf
         ways = np.where(first, self._home[numbers] - HOME - x[numbers], (x - self._clear)[numbers])
         speeds = np.where(first, v[numbers], -v[numbers])
         least = self._fastest.least(np.maximum(ways[goes], 0.0), np.maximum(speeds[goes], 0.0))
-        return float(least.min(initial=np.inf))
+        return float(least.min())
 
     def soonest(self, number: int) -> float:
         """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part
