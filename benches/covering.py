@@ -35,10 +35,10 @@ MUTANTS = ROOT / "benches" / "mutants.toml"
 OFTEN = 40
 """What has been seen is written after so many tests."""
 
-WORTH = 2.0
+WORTH = 5.0
 """A test is worth its time where it takes so many new branches a second."""
 
-BRIEF = 5.0
+BRIEF = 3.0
 """A test that starts processes, in which nothing is seen, is kept where it takes no longer [s]."""
 
 KEPT = ("tests/core/test_core_alone.py::test_the_core_runs_without_apps",)
