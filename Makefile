@@ -6,7 +6,7 @@ FACTORY := $(PY) -m factory
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
-	@echo "make test      the tests that each catch something alone"
+	@echo "make test      the tests that take nearly all branches of the package"
 	@echo "make test-core those of them that need the core alone"
 	@echo "make test-all  all tests, the long campaigns too"
 	@echo "make bench     times and sizes, written to docs/benchmarks.md"

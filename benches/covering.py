@@ -20,17 +20,16 @@ import sys
 import tomllib
 from collections.abc import Collection, Generator, Mapping, Sequence
 from math import inf
-from pathlib import Path
 from time import process_time
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-ROOT = Path(__file__).resolve().parent.parent
+from benches.mutants import LIST, ROOT
+
 FOLDER = ROOT / "build" / "covering"
 COVERED = ROOT / "tests" / "covered.txt"
-MUTANTS = ROOT / "benches" / "mutants.toml"
 
 OFTEN = 40
 """What has been seen is written after so many tests."""
@@ -145,7 +144,7 @@ def chosen(taken: Mapping[str, Taken], cost: Mapping[str, float]) -> set[str]:
 
 def killers() -> set[str]:
     """The tests that were first to kill a mutant."""
-    return {one["now"] for one in tomllib.loads(MUTANTS.read_text())["mutant"] if one.get("now")}
+    return {one["now"] for one in tomllib.loads(LIST.read_text())["mutant"] if one.get("now")}
 
 
 def listed(names: Collection[str], kept: Collection[str]) -> list[str]:

@@ -82,8 +82,13 @@ def laid_out(text: str, settings: Settings = DEFAULT) -> Layout:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
-        plan = read(file).plain
-        return Ground().lay_out(plan, product_geometry(plan.pag), settings)
+        return of_file(file, settings)
+
+
+def of_file(file: Path, settings: Settings = DEFAULT) -> Layout:
+    """The factory of the PAG in a file on its floor."""
+    plan = read(file).plain
+    return Ground().lay_out(plan, product_geometry(plan.pag), settings)
 
 
 @dataclass(frozen=True)
@@ -104,8 +109,7 @@ class Case:
         """Its factory on its floor."""
         if self.example is None:
             return laid_out(robots_at_least(self.robots))
-        plan = read(EXAMPLES / f"{self.example}.pag").plain
-        return Ground().lay_out(plan, product_geometry(plan.pag), DEFAULT)
+        return of_file(EXAMPLES / f"{self.example}.pag")
 
     def simulation(self, layout: Layout, shown: bool = False) -> Simulation:
         """A run of it, ready to go; `shown` as in a RunRequest."""
