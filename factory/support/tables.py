@@ -14,6 +14,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from factory.support.errors import InputError, did_you_mean
+from factory.support.named import Named
 
 T = TypeVar("T")
 
@@ -87,6 +88,10 @@ def _value(kind: Any, table: Any, place: str) -> Any:
         if any(type(table) is type(word) and table == word for word in kinds):
             return table
         raise _wrong(place, f"one of {', '.join(map(str, kinds))}", table)
+    if isinstance(kind, type) and issubclass(kind, Named):
+        if table in kind.all:
+            return kind.all[table]
+        raise _wrong(place, f"one of {', '.join(kind.all)}", table)
     if origin is tuple:
         return _tuple(kinds, table, place)
     if origin is frozenset:

@@ -16,8 +16,8 @@ import pytest
 from factory.api import RunRequest, Simulation, State
 from factory.engine.simulation.mujoco.world import MujocoWorld
 from factory.floor.layout.hands.clamp import Clamp
-from factory.floor.layout.hands.hand import AIR
 from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.reach import AIR
 from factory.floor.layout.hands.tips import shares
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read

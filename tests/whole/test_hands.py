@@ -19,9 +19,9 @@ from factory.floor.layout.clearance import certify
 from factory.floor.layout.exclusions import awaited_positions, coordinated
 from factory.floor.layout.hands.bores import bores
 from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.hands.hand import AIR
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.limbs import limbs
+from factory.floor.layout.hands.reach import AIR
 from factory.floor.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.floor.layout.layout import Layout
 from factory.pipeline import read

@@ -20,6 +20,7 @@ from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands.apart import LEVEL, HandsApart
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding
+from factory.floor.layout.hands.kinds import ABOVE, BELOW
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.outermost import outermost
 from factory.floor.layout.hands.places import Places
@@ -176,7 +177,7 @@ def test_the_post_of_a_feeder_stands_behind_its_hand(tmp_path: Path) -> None:
     assert hand is not None
     rear = min(path.frame(layout.payloads["p0"])[0], -path.reach - 0.03) - 0.01
     x, y = layout.product.middle[:2] + rear * np.array(path.heading)
-    moved = replace(hand, kind="below", places=((float(x), float(y), hand.places[0][2]),))
+    moved = replace(hand, kind=BELOW, places=((float(x), float(y), hand.places[0][2]),))
     hands = tuple(moved if r == leaf.carrier else h for r, h in enumerate(layout.hands))
     there = replace(layout, hands=hands)
     grip, feeder = there.grip(leaf.carrier), feeder_of(there, "p0")
@@ -213,7 +214,7 @@ def test_a_beam_is_over_that_of_the_carrier_that_it_crosses(tmp_path: Path) -> N
     layout = laid_out(PARTS["a bar behind what is brought"], tmp_path)
     holding = Holding(layout.factory, layout.product)
     guest = next(r for r, on in enumerate(holding.on) if on == 0)
-    above = Hand("above", ((0.0, 0.0, 0.1),), beam=0.3)
+    above = Hand(ABOVE, ((0.0, 0.0, 0.1),), beam=0.3)
     apart = HandsApart(holding, lambda robot, heading: above)
     frames = [((0.0, 1.0), (1.0, 0.0))]
     beside, across = (

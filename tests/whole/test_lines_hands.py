@@ -25,10 +25,11 @@ from factory.floor.layout.clearance import certify
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands import holding
-from factory.floor.layout.hands.hand import AIR, Hand
+from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.places import places as found_places
+from factory.floor.layout.hands.reach import AIR
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read

@@ -26,9 +26,6 @@ DOT, RING = 2.4, 9.0
 LINE = 112
 """Greatest number of letters in a line of words."""
 
-WAYS = {"below": "from below", "behind": "from behind", "above": "from above"}
-"""Direction from which a kind of hand holds."""
-
 STYLE = """
 .beside { fill: #d9dde3; stroke: #a3adba; stroke-width: 1; fill-opacity: 0.4; }
 .held { fill: #6f9fd8; stroke: #274f82; stroke-width: 1.5; fill-opacity: 0.6; }
@@ -83,7 +80,7 @@ class _GripSheet(ViewSheet):
 
     def _row(self, miss: Miss, y: float) -> float:
         """The words and views of one kind of hand; returns the height below them."""
-        kind, canvas = WAYS[miss.kind], self.canvas
+        kind, canvas = f"from {miss.kind}", self.canvas
         canvas.text((EDGE, y + 22), kind.capitalize(), 19, "h")
         if miss.at is None:
             canvas.text((EDGE + INDENT, y + 22), "no place for a pad", 17)

@@ -15,6 +15,7 @@ import numpy as np
 from factory.api import Factory, Hand, Layout
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
+from factory.floor.layout.hands.kinds import BELOW, NONE
 from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import Places, centre_of
 from factory.floor.layout.hands.surfaces import Way
@@ -69,14 +70,14 @@ class _Choice:
         """Choose the hands of the robots that now share a robot's guidepath, and its lanes. Returns
         their orientation, +1 or -1."""
         before = self.before.hand(old)
-        if before is None or before.kind == "none":
+        if before is None or not before.kind.holds:
             for robot in pieces:
                 self.settled[robot] = before
             return 1
         tried = []
         for way in (1, -1):
             hands = self._hands(old, carrier, pieces, way, max(STRONG, before.share))
-            lacking = sum(hand.kind == "none" for hand in hands.values())
+            lacking = sum(not hand.kind.holds for hand in hands.values())
             tried.append((lacking, max(hand.share for hand in hands.values()), way, hands))
             if not lacking and tried[-1][1] <= STRONG:
                 break
@@ -111,14 +112,14 @@ class _Choice:
         before = self.before.hand(self.holding.origins[guest])
         if self.holding.on[guest] != robot or guest in self.holding.cut:
             return None
-        if before is None or before.kind != "below":
+        if before is None or not before.kind.rises:
             return None
         u, t = self.holding.headings[guest], self.holding.headings[robot]
         sides = (t, (-t[0], -t[1])) if self.holding.is_carrier(guest) else (t,)
         at, radius = np.array(before.places), np.full(len(before.places), before.radius)
         self.in_the_way.apart.kept[guest] = before
         free = self.in_the_way.apart.own_side(
-            guest, "below", Places(at, radius, radius, radius, radius), u, t
+            guest, BELOW, Places(at, radius, radius, radius, radius), u, t
         )
         if free.all():
             return before
@@ -142,9 +143,9 @@ class _Choice:
         """The best hand from below of a robot, using at most a given share of its strength; of the
         kind `none` if there is none."""
         label = held(self.holding.factory, robot)
-        hands = OneHand(self.in_the_way).of_kind("below", [robot], frames)
+        hands = OneHand(self.in_the_way).of_kind(BELOW, [robot], frames)
         if hands and hands[0].share <= most:
             return hands[0]
         parts = self.holding.factory.contents[label]
         x, y, z = centre_of(self.holding.product, parts)[1].tolist()
-        return Hand("none", ((x, y, z),), share=most)
+        return Hand(NONE, ((x, y, z),), share=most)

@@ -10,10 +10,11 @@ import numpy as np
 from factory.api import Array, Factory, Hand, Layout, Operation, Truth
 from factory.floor.layout.dimensions import FINGER, Clearance
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
-from factory.floor.layout.hands.hand import Kind, widths
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
+from factory.floor.layout.hands.kinds import NONE, Kind
 from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.reach import widths
 from factory.floor.layout.hands.surfaces import Way, swept
 
 
@@ -37,7 +38,7 @@ class Lane:
 SAME = 1e-5
 """Places that are no further apart across are on one line [m]."""
 
-NOTHING = Hand("none", ((0.0, 0.0, 0.0),))
+NOTHING = Hand(NONE, ((0.0, 0.0, 0.0),))
 """Where there is no hand."""
 
 

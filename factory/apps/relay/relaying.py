@@ -184,11 +184,11 @@ class _Search:
         """The robots (by name) that no hand serves although one does without relays; if there are
         none, those with a fault of the certificate."""
         robots, hands = self.found.factory.robots, self.found.hands
-        none = {h for h in self.layout.hands if h is not None and h.kind == "none"}
+        none = {h for h in self.layout.hands if h is not None and not h.kind.holds}
         held = {
             robots[number].name
             for number, hand in enumerate(hands)
-            if hand is not None and hand.kind == "none" and hand not in none
+            if hand is not None and not hand.kind.holds and hand not in none
         }
         return held or {name for fault in certify(self.found).faults for name in fault.robots}
 

@@ -30,7 +30,7 @@ def unheld(layout: Layout) -> list[str]:
     """The labels that robots hold without a hand, where hands are chosen."""
     factory, labels = layout.factory, list[str]()
     for robot, hand in enumerate(layout.hands):
-        if hand is None or hand.kind != "none":
+        if hand is None or hand.kind.holds:
             continue
         for tour in factory.tours[robot]:
             last = factory.operations[tour[-1]]

@@ -158,7 +158,7 @@ def _add_chain(layout: Layout, robot: Robot, drive: Drive, section: Mapping[str,
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:
     """What the limbs of a hand and its tip look like, each file read once; nothing for none."""
-    if hand is None or hand.kind == "none":
+    if hand is None or not hand.kind.holds:
         return {}
     for name in (hand.kind, hand.tip):
         if name not in loaded:

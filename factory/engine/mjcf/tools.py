@@ -61,7 +61,7 @@ def gyration(layout: Layout, robot: int) -> float:
     InputError (NoGrip) where it has no hand."""
     label, *_ = layout.factory.deliveries(robot)
     hand, parts = layout.hand(robot), layout.factory.contents[label]
-    if hand is None or hand.kind == "none":
+    if hand is None or not hand.kind.holds:
         message = f"{layout.factory.robots[robot].name} has no hand to turn '{label}' with"
         position = layout.factory.by_label[label].position
         hint = "give the part a flat place above"

@@ -204,7 +204,7 @@ class Timing:
         )
         robot = self.factory.operations[leaf].carrier
         hand, sooner = layout.hand(robot), 0.0
-        if hand is None or not (hand.first or hand.kind == "above"):
+        if hand is None or not (hand.first or hand.kind.hangs):
             speed = self.settings.speed * (1 + self.jitter)
             fastest = SpeedProfile(speed, self.settings.acceleration)
             at = float(self.starts[leaf][self.factory.operations[leaf].robots.index(robot)])

@@ -138,7 +138,7 @@ def _reason(layout: Layout, fault: Fault) -> Diagnostic:
     factory = layout.factory
     for robot in factory.robots:
         hand = layout.hand(robot.index)
-        if robot.name in fault.robots and hand is not None and hand.kind == "none":
+        if robot.name in fault.robots and hand is not None and not hand.kind.holds:
             label = held(factory, robot.index).partition("@")[0]
             message = f"no hand can hold '{label}', and robots without hands meet here"
             hint = (

@@ -105,11 +105,11 @@ def _feeder(layout: Layout, label: str) -> Feeder:
     hand, grip = layout.hand(robot), layout.grip(robot)
     c = Clearance(layout.clearance, layout.factory.carriage)
     back = -c.post(path.reach, min(rear, grip[0]) if grip else rear)
-    if hand is not None and hand.tall:
+    if hand is not None and hand.kind.tall:
         top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
         top += layout.visits[first, robot].height + rises - elevation
         room = max(room, round(top - highest + layout.clearance, 6))
-        if hand.kind == "above":
+        if hand.kind.hangs:
             across = round((near + far) / 2, 3)
     over = PAYLOAD + elevation - layout.product.low[2]
     low = float(over + highest) + room

@@ -144,7 +144,7 @@ def _taken(outlet: Outlet) -> tuple[float, ...]:
     """The rectangle (xlo, ylo, xhi, yhi) about an outlet's part through which a hand from above
     comes: from its tower, against the heading."""
     hand, path = outlet.layout.hand(outlet.robot), _path(outlet)
-    if hand is None or hand.kind != "above":
+    if hand is None or not hand.kind.hangs:
         return inf, inf, -inf, -inf
     half = np.full(2, max(hand.radius, hand.width / 2) + BESIDE_HAND)
     if hand.clamp is not None:

@@ -134,7 +134,7 @@ def slot_of(layout: Layout) -> tuple[float, float, float] | None:
     below."""
     path, hand = layout.guidepaths[0], layout.hand(0)
     upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
-    if hand is None or hand.kind != "below":
+    if hand is None or not hand.kind.rises:
         return None
     ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
     ends += Clearance(layout.clearance).stop

@@ -60,7 +60,7 @@ class LayoutTable:
                 words = f"a travel from 0 and a reach above 0, not {path.travel} and {path.reach}"
                 raise ValueError(f"guidepaths[{number}] must have {words}")
         for number, hand in enumerate(self.hands):
-            if hand and hand.kind != "none" and not (hand.places and hand.radius > 0):
+            if hand and hand.kind.holds and not (hand.places and hand.radius > 0):
                 raise ValueError(f"hands[{number}] must have places, and a radius above 0")
 
     @classmethod

@@ -235,12 +235,12 @@ def held_shape(
     ahead = [px * u[0] + py * u[1] for px, py in pads]
     offset = post = round(pads[0][0] * t[0] + pads[0][1] * t[1], 3)
     least = 0.0
-    if hand.tall:
+    if hand.kind.tall:
         ends = [tour[-1] for tour in factory.tours[robot]]
         final = [last if factory.drops(n) else lies(operations[n].label, n) for n in ends]
         rear = min(joined[0] for joined in final)
         reach = arm = up(max(reach, c.c + MAST / 2 - rear))
-        if hand.kind == "above" and hands.is_fed(robot):
+        if hand.kind.hangs and hands.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
             if hand.wait and not factory.lowers(robot):
                 thick = 2 * max(hand.radius, FINGER / 2)

@@ -240,7 +240,7 @@ def goes_home(layout: Layout, robot: int, operation: int) -> bool:
     hand, chains = layout.hand(robot), layout.chains
     if chains is not None and robot in chains.robots:
         return True
-    return not layout.factory.operations[operation].inputs or (hand is not None and hand.tall)
+    return not layout.factory.operations[operation].inputs or (hand is not None and hand.kind.tall)
 
 
 def carried_ahead(layout: Layout) -> dict[tuple[int, int], float]:
@@ -261,7 +261,7 @@ def comes_last(layout: Layout, robot: int, operation: int) -> bool:
     """Whether a robot comes home when the part of its feeder is down, as it is at the start of a
     run."""
     hand = layout.hand(robot)
-    is_above = hand is not None and hand.kind == "above"
+    is_above = hand is not None and hand.kind.hangs
     return is_above and not layout.factory.operations[operation].inputs
 
 

@@ -70,7 +70,7 @@ class Passing:
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
         self._clear = self._home - [passing(outlet.layout, outlet.leaf) for outlet in outlets]
         hands = [layout.hand(robot) for robot in carriers]
-        self._kinds = ["none" if hand is None else hand.kind for hand in hands]
+        self._hang = [hand is not None and hand.kind.hangs for hand in hands]
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
@@ -106,7 +106,7 @@ class Passing:
     def is_under(self, number: int) -> bool:
         """Whether a robot's empty hand is where the next part comes down. Hands from above come
         after the part."""
-        return self._kinds[number] == "above" and not self.is_aside(number)
+        return self._hang[number] and not self.is_aside(number)
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is far enough away with its part for the next one to come down;
@@ -134,7 +134,7 @@ class Passing:
     def soonest(self, number: int) -> float:
         """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part
         has to be down before."""
-        if self._kinds[number] == "above":
+        if self._hang[number]:
             return 0.0
         way = float(self._home[number] - self._at()[0][number])
         return self._fastest.rest(max(way, 0.0))

@@ -71,7 +71,7 @@ class Strength:
         self.dropped: Drop | None = None
         self._m, self._d, self._model = m, d, model
         held = {grip: self._hand_on(*grip) for grip in welds}
-        self._hands = {grip: hand for grip, hand in held.items() if hand and hand.kind != "none"}
+        self._hands = {grip: hand for grip, hand in held.items() if hand and hand.kind.holds}
         self._robots = np.array(sorted({robot for robot, _ in self._hands}), np.intp)
         self._grips = [(grip, weld) for grip, weld in welds.items() if grip in self._hands]
         # the last grip is of all welds that are no grips, and of no hand

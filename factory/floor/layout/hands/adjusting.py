@@ -31,7 +31,7 @@ def without_hands(hands: Hands, however: bool = False) -> set[int]:
     for robot, tours in enumerate(hands.tours.of):
         if len({*hands.tours.alike(tours)}) > 1 and held(hands.holding.factory, tours[0]):
             chosen = (hands.hand(robot, u, t) for u, t in hands.holding.frames(tours[0]))
-            none = (hand is None or hand.kind == "none" for hand in chosen)
+            none = (hand is None or not hand.kind.holds for hand in chosen)
             if all(none) if however else any(none):
                 robots.add(robot)
     return robots

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_TOP, PAYLOAD
-from factory.floor.layout.hands.hand import Hand, Kind
+from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.places import Places
-from factory.floor.layout.hands.reach import back, halves, reach
+from factory.floor.layout.hands.reach import back, halves
 from factory.floor.layout.hands.surfaces import Way, swept
 from factory.support.arrays import Array, Truth
 from factory.theory.plant.operation import Operation
@@ -42,7 +43,7 @@ class HandsApart:
 
     def over_fingers(self, kind: Kind, places: Places) -> Truth:
         """Whether a hand behind stays over the fingers of those below (n,)."""
-        if kind != "behind":
+        if not kind.level:
             return np.ones(len(places), bool)
         least = self.holding.product.low[2] - UNDER
         return np.asarray(places.at[:, 2] - halves(places.radius) >= least)
@@ -56,7 +57,7 @@ class HandsApart:
             return free
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         hand = self.hand_of(carrier, t)
-        if hand.kind == "below" and kind == "below":
+        if hand.kind.rises and kind.rises:
             half = hand.half + BESIDE
             free &= (hand.places[0][axis] - places.at[:, axis]) * side >= halves(
                 places.radius
@@ -80,7 +81,7 @@ class HandsApart:
         """Distance that a hand reaches over the line of a carrier whose tall mast comes along
         there, or over a broader part of its hand (n,) [m]."""
         carrier = self.holding.on[robot]
-        if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
+        if carrier < 0 or not (hand := self.hand_of(carrier, t)).kind.tall:
             return np.zeros(len(places))
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         over = (places.at[:, axis] - hand.places[0][axis]) * side
@@ -96,7 +97,7 @@ class HandsApart:
         for u, t in frames:
             if self.crossing(robot, at, u, t).any():
                 carriers = self.hand_of(self.holding.on[robot], t)
-                if carriers.kind == "above":
+                if carriers.kind.hangs:
                     height = max(height, carriers.beam + BEAM + LEVEL)
         return height
 
@@ -109,23 +110,23 @@ class HandsApart:
         carrier = self.holding.on[robot]
         if carrier < 0 or self.holding.serves_fixed(robot):
             return
-        if (hand := self.hand_of(carrier, t)).kind == "none":
+        if not (hand := self.hand_of(carrier, t)).kind.holds:
             return
-        if kind == hand.kind == "below":  # fingers keep to their sides
+        if kind.rises and hand.kind.rises:  # fingers keep to their sides
             return
-        way_out = swept(*reach(self.holding.product, kind, places.at, places.radius, u), back(u))
+        way_out = swept(*kind.boxes(self.holding.product, places.at, places.radius, u), back(u))
         way_out[1][:, 2] += self.holding.factory.lowering(robot)
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        low, high = reach(self.holding.product, hand.kind, at, radius, t)
-        if hand.kind == "behind":
+        low, high = hand.kind.boxes(self.holding.product, at, radius, t)
+        if hand.kind.level:
             low[:, 2] -= self.holding.factory.lowering(carrier)
-        if hand.kind == "above":
+        if hand.kind.hangs:
             yield (*way_out, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2
             low, high = at - half, at + half
             low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
-        ways = [back(t) if hand.tall else t]
-        if carrier in self.holding.turning and not hand.tall:
+        ways = [back(t) if hand.kind.tall else t]
+        if carrier in self.holding.turning and not hand.kind.tall:
             ways.append(back(t))
         for way in ways:
             yield (*way_out, np.stack(swept(low, high, way), axis=1))

@@ -39,7 +39,7 @@ def bores(layout: Layout) -> Iterator[Bore]:
                 if (tool := chains.hand(label)).tip == "pin":
                     whole = label.partition("/")[0]
                     yield Bore(whole, robot.name, tool.kind, tool.places[0], tool.radius)
-        if hand is not None and hand.kind != "none" and hand.tip == "pin":
+        if hand is not None and hand.kind.holds and hand.tip == "pin":
             label = held(layout.factory, robot.index)
             for at in hand.places:
                 yield Bore(label, robot.name, hand.kind, at, hand.radius)

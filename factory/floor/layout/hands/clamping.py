@@ -7,15 +7,17 @@ all its way from open to closed, as a column that ends where it does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from factory.floor.layout.hands.clamp import Clamp
-from factory.floor.layout.hands.hand import AIR, Kind, Point3
+from factory.floor.layout.hands.hand import Point3
 from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.places import Places
+from factory.floor.layout.hands.reach import AIR
 from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.hands.tips import TERMS, shares
 from factory.support.arrays import Array, Truth
@@ -23,9 +25,6 @@ from factory.theory.problem.robot_bodies import Jaw
 
 OPEN = 1e-3
 """Least distance of open jaws from what comes between them [m]."""
-
-UP: Mapping[Kind, int] = {"below": 1, "above": -1}
-"""The kinds of hands with jaws, and which way these reach from the pad."""
 
 STEP = 1e-6
 """Jaws close by whole multiples of this [m]."""
@@ -63,7 +62,7 @@ class Clamping:
             for tour, at in zip(tours, points, strict=True)
         )
         rows = (tuple(closed[0].round(6).tolist()) for closed in each)
-        return Clamp(jaws, tuple(rows), UP[kind])
+        return Clamp(jaws, tuple(rows), kind.up)
 
     def places(self, robot: int, kind: Kind, places: Places, u: Way) -> Places:
         """Those of some places between whose sides the jaws of a robot can close, with the share of
@@ -73,7 +72,7 @@ class Clamping:
             return places
         closed, fits = self._closed(robot, kind, places.at, u)
         places, closed = places.chosen(fits), closed[fits]
-        clamps = (Clamp(jaws, (tuple(row),), UP[kind]) for row in closed.tolist())
+        clamps = (Clamp(jaws, (tuple(row),), kind.up) for row in closed.tolist())
         terms = np.array([clamp.gauge(u) for clamp in clamps]).reshape(len(closed), TERMS, 6)
         label = held(self.holding.factory, robot)
         load = np.concatenate(np.broadcast_arrays(*self.holding.loads(label).about(places.at)))
@@ -91,7 +90,7 @@ class Clamping:
             half = np.maximum(jaw.back - face, jaw.high[0] - jaw.low[0]) / 2
             at = places.at + (jaw.low[0] + jaw.high[0]) / 2 * ahead
             at = at + (jaw.side * (face + half))[:, None] * across
-            at[:, 2] += UP[kind] * (jaw.high[2] + AIR)
+            at[:, 2] += kind.up * (jaw.high[2] + AIR)
             yield replace(places, at=at, radius=half)
 
     def _closed(self, robot: int, kind: Kind, at: Array, u: Way) -> tuple[Array, Truth]:
@@ -113,7 +112,7 @@ class Clamping:
         along, sense = (0, u[0]) if u[0] else (1, u[1])
         side = 1 - along, round(jaw.side * (u[0] if u[0] else -u[1]))
         begin, end = sorted((sense * jaw.low[0], sense * jaw.high[0]))
-        way = UP[kind]
+        way = kind.up
         back = np.full(len(at), self.holding.box(label)[(1 - way) // 2, 2])
         heights = np.sort(np.stack([back, at[:, 2] + way * jaw.high[2]]), axis=0)
         low = np.stack([at[:, along] + begin, heights[0]], axis=1)

@@ -17,9 +17,7 @@ def middle(hand: Hand) -> Array:
 
 def outward(hand: Hand, heading: Point2) -> Array:
     """Direction from the face of a hand's tips to the payload (3,), for a robot with a heading."""
-    if hand.kind == "behind":
-        return np.array([*heading, 0.0])
-    return np.array([0.0, 0.0, -1.0 if hand.kind == "above" else 1.0])
+    return np.array(hand.kind.toward(heading))
 
 
 def gauge(hand: Hand, heading: Point2, tour: int = 0) -> Array:

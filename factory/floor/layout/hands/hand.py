@@ -1,32 +1,19 @@
 """A hand: where and how a robot holds what it carries.
 
-It touches places of the payload's surface with pads, and reaches there in one of three ways.
-*Below*: a finger under the plane of payloads, and a column from it up to the place. *Behind*: a
-tower behind the payload, and a bar from it ahead to the place. *Above*: a tower, a beam over all
-that there is, and a stem from it down to the place.
+It touches places of the payload's surface with pads, and reaches there in the way of its kind.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
-
-import numpy as np
 
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.clamp import Clamp
+from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.reach import SLENDER
 from factory.floor.layout.hands.tips import TipName
-from factory.support.arrays import Array
 
 Point3 = tuple[float, float, float]
-
-Kind = Literal["below", "behind", "above", "none"]
-
-AIR = 2e-4
-"""How far a pad stays off the surface that it holds [m]: it slides along it without touching."""
-
-SLENDER = 0.001
-"""Least width of a finger [m]."""
 
 STEM = 0.006
 """Diameter of the thinnest column or stem [m]."""
@@ -43,7 +30,7 @@ class Hand:
     """The gripper of a robot: how it holds its payload. Of the kind `none` if nothing can hold.
 
     Attributes:
-        kind: below, behind, above or none.
+        kind: from where it reaches the payload.
         places: points of the payload's surface at the middles of the tips, in the frame of the
             finished product [m]: one or, from below, two on one line along the heading.
         radius: of a tip [m].
@@ -73,11 +60,6 @@ class Hand:
         return max(FINGER / 2, self.radius) if self.clamp is None else self.clamp.half
 
     @property
-    def tall(self) -> bool:
-        """Whether its mast reaches up among the payloads."""
-        return self.kind in ("behind", "above")
-
-    @property
     def width(self) -> float:
         """Width of its finger, or of the bar to its stem [m]."""
         return min(max(2 * self.radius, SLENDER), FINGER)
@@ -86,9 +68,3 @@ class Hand:
     def column(self) -> float:
         """Diameter of its column or stem [m]: half the pad's, within STEM and FINGER."""
         return min(2 * self.radius, max(STEM, min(self.radius, FINGER)))
-
-
-def widths(radius: Array) -> Array:
-    """Widths (n,) of the fingers of pads of some radii (n,) [m]: no wider than the pads, within
-    bounds."""
-    return np.minimum(np.maximum(2 * radius, SLENDER), FINGER)

@@ -10,7 +10,8 @@ import numpy as np
 
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import axis_of, fed_of
-from factory.floor.layout.hands.hand import Hand, Kind, Point3
+from factory.floor.layout.hands.hand import Hand, Point3
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
 from factory.floor.layout.layout import carriers
@@ -52,7 +53,7 @@ class Holding:
         for each in factory.robots:
             gear = (factory.operations[number] for number in each.operations)
             self._made.append([o for o in gear if o.carrier == each.index])
-        self._places: dict[tuple[str, Kind, int, int, float], Places] = {}
+        self._places: dict[tuple[str, Kind, tuple[int, int], float], Places] = {}
         self._boxes: dict[str, Array] = {}
         self._box: dict[str, Array] = {}
         self._loads: dict[str, Loads] = {}
@@ -87,14 +88,15 @@ class Holding:
         """The operation that a robot delivers to."""
         return self.factory.last(robot)
 
-    def places(self, label: str, kind: Kind, axis: int, way: int, radius: float = 0.0) -> Places:
-        """The places on a side of a sub-assembly, cached: with the best pad at each, or with one of
-        a `radius` [m]."""
-        key = label, kind, axis, way, radius
+    def places(self, label: str, kind: Kind, heading: Way, radius: float = 0.0) -> Places:
+        """The places of a sub-assembly for a kind of hand of a robot with a heading, cached: with
+        the best pad at each, or with one of a `radius` [m]."""
+        side = kind.side(heading)
+        key = label, kind, side, radius
         if key not in self._places:
-            of, loads = (tuple(self.factory.contents[label]), (axis, way)), self.loads(label)
+            of, loads = (tuple(self.factory.contents[label]), side), self.loads(label)
             if radius:
-                of_any_size = self.places(label, kind, axis, way)
+                of_any_size = self.places(label, kind, heading)
                 candidates = self.product.kept(resized, *of, loads, of_any_size, radius)
             else:
                 asked, mix = tuple(self.wanted.get(label, ())), self.factory.pag.mix is not None
@@ -158,4 +160,4 @@ def held(factory: Factory, robot: int, at_last: bool = False) -> str:
 
 def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
     """Number of labels that a robot brings without a hand."""
-    return len(factory.tours[robot]) if hand is not None and hand.kind == "none" else 0
+    return len(factory.tours[robot]) if hand is not None and not hand.kind.holds else 0

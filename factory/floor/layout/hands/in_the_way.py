@@ -15,11 +15,12 @@ import numpy as np
 from factory.floor.layout.dimensions import SLOT
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.clamping import Clamping
-from factory.floor.layout.hands.hand import Hand, Kind
+from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.kinds import Boxes, Kind
 from factory.floor.layout.hands.lowered import Lowered
 from factory.floor.layout.hands.places import SMALL, Places
-from factory.floor.layout.hands.reach import back, halves, reach, under_beam
+from factory.floor.layout.hands.reach import back, halves
 from factory.floor.layout.hands.surfaces import TOUCH, Way, hit, retreat, swept
 from factory.floor.layout.hands.tips import STRONG
 from factory.floor.layout.presence import ACROSS, ALONG
@@ -91,12 +92,8 @@ class InTheWay:
     ) -> Places:
         """The places on the side of what a robot takes that a kind of hand holds, with the best pad
         at each or, if it fits, with one of a `radius` [m]."""
-        axis, way = (2, -1 if kind == "below" else 1)
         u, _ = frames[0]
-        if kind == "behind":
-            axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
-        label = held(self.holding.factory, robot)
-        places = self.holding.places(label, kind, axis, way, radius)
+        places = self.holding.places(held(self.holding.factory, robot), kind, u, radius)
         return self.clamping.places(robot, kind, places, u)
 
     def checks(
@@ -140,17 +137,17 @@ class InTheWay:
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
         passing = [self._passing(robot, label, kind, places, u, t) for u, t in headings]
         first = np.logical_or.reduce([passed.first for passed in passing])
-        if self.holding.is_fed(robot) and kind != "below":
+        if self.holding.is_fed(robot) and kind.tall:
             free["own"] &= ~first
-        if self.holding.is_fed(robot) and kind == "above":
+        if self.holding.is_fed(robot) and kind.hangs:
             free["feeder"] &= self._beside_rod(robot, label, places, *frames[0])
         if self.holding.factory.drops(self.holding.last(robot).index):
             free["tray"] &= (
                 self._beside_slot(places, frames[0][0])
-                if kind == "below"
+                if kind.rises
                 else self.reach(kind, places, frames[0][0])[0][:, 2] >= self.holding.product.low[2]
             )
-        if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
+        if kind.level or (kind.hangs and not self.holding.is_fed(robot)):
             first |= True
         for passed in passing:
             free["joined"] &= ~passed.joined
@@ -197,17 +194,14 @@ class InTheWay:
         ):
             yield "lowered", ways
 
-    def reach(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
-        """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
-        return reach(self.holding.product, kind, places.at, places.radius, u)
+    def reach(self, kind: Kind, places: Places, u: Way) -> Boxes:
+        """The boxes of hands of a kind at some places."""
+        return kind.boxes(self.holding.product, places.at, places.radius, u)
 
-    def _facing(self, kind: Kind, places: Places, u: Way) -> tuple[Array, Array]:
+    def _facing(self, kind: Kind, places: Places, u: Way) -> Boxes:
         """The same among what other robots hold, with ROOM ahead of a face behind or above."""
         low, high = self.reach(kind, places, u)
-        axis, ahead = (2, -1.0) if kind == "above" else (0, u[0]) if u[0] else (1, u[1])
-        if kind != "below":
-            (high if ahead > 0 else low)[:, axis] += ahead * ROOM
-        return low, high
+        return kind.with_room(low, high, u, ROOM) if kind.tall else (low, high)
 
     def _beside_rod(self, robot: int, label: str, places: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for its feeder's rod: behind a hand above it, or on the side away
@@ -239,18 +233,18 @@ class InTheWay:
         it comes and leaves: along its heading, and downwards if it lowers its payload."""
         last, (low, high) = self.holding.last(robot), self.reach(kind, places, u)
         if self.holding.factory.drops(last.index):
-            if kind != "behind":
+            if not kind.level:
                 whole = held(self.holding.factory, robot, at_last=True)
                 yield (*swept(low, high, back(u)), self.holding.boxes(whole))
             return
-        broad = under_beam(kind, low, high, places.radius)
+        broad = kind.over_all(low, high, places.radius)
         for boxes in self.lowered.boxes(last, robot, (u,)):
             yield (*swept(*broad, back(u)), boxes)
         lifted = self.holding.factory.goes_up(robot)
-        gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
-        if kind == "below":
+        gone = swept(low, high) if kind.hangs and lifted else swept(low, high, back(u))
+        if kind.rises:
             gone[1][:, 2] += self.holding.factory.lowering(robot)
-        if kind != "behind":
+        if not kind.level:
             yield (*gone, self.holding.boxes(last.label))
             return
         # its payload comes along the same way, or takes the bar down with it, which then rises
@@ -263,7 +257,7 @@ class InTheWay:
     def _raised(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
         """The same for a hand above whose lift is up: it goes home over what it has delivered to,
         which may go on along t meanwhile, or either way if its carrier turns."""
-        if kind == "above" and self.holding.factory.lowers(robot):
+        if kind.hangs and self.holding.factory.lowers(robot):
             low, high = self.reach(kind, places, u)
             low[:, 2] += self.holding.factory.lowering(robot)
             boxes = self.holding.boxes(self.holding.last(robot).label)
@@ -307,10 +301,9 @@ class InTheWay:
         if not self.holding.is_fed(robot):
             for side in (t, back(t)):
                 yield (*swept(low, high, u, side), part_boxes)
-        elif kind == "behind":
+        elif kind.level:
             # the part comes down along the pad, its widest place too, and no nearer than may be
-            axis, ahead = (0, u[0]) if u[0] else (1, u[1])
-            (high if ahead > 0 else low)[:, axis] += ahead * (ACROSS + TOUCH)
+            low, high = kind.with_room(low, high, u, ACROSS + TOUCH)
             low[:, 2] -= 10.0
             yield low, high, part_boxes
         else:
@@ -324,7 +317,7 @@ class InTheWay:
         since it has a pile by then and the lift is up."""
         low, high = self._facing(kind, places, u)
         rising = low
-        if kind == "behind":
+        if kind.level:
             low, high = swept(low, high, back(u))
             rising = low - [0.0, 0.0, self.holding.factory.lowering(robot)]
         for operation in self.holding.made(robot):

@@ -27,7 +27,7 @@ def homes(layout: Layout) -> dict[int, float]:
         hand = layout.hand(robot.index)
         if hand is None or not hand.first:
             continue
-        if not (operations[robot.operations[0]].inputs and hand.tall):
+        if not (operations[robot.operations[0]].inputs and hand.kind.tall):
             ways[robot.index] = layout.guidepaths[robot.index].length
     return ways
 
@@ -41,7 +41,7 @@ def before_next(layout: Layout, robot: int) -> float:
     """Greatest arc length of a robot while its next part comes down [m]: its B end, or less if its
     hand is above what it takes."""
     length, hand = layout.guidepaths[robot].length, layout.hand(robot)
-    tours = layout.factory.tours[robot] if hand is not None and hand.kind == "above" else ()
+    tours = layout.factory.tours[robot] if hand is not None and hand.kind.hangs else ()
     firsts = (layout.factory.operations[tour[0]] for tour in tours)
     ways = (passing(layout, leaf) for leaf in firsts if not leaf.inputs)
     return length - max(ways, default=0.0)

@@ -17,14 +17,14 @@ def rises_first(layout: Layout, robot: int) -> bool:
     """Whether a robot's lift has to be up before it goes home: its hand is above what it
     released."""
     hand = layout.hand(robot)
-    return hand is not None and hand.kind == "above" and layout.factory.lowers(robot)
+    return hand is not None and hand.kind.hangs and layout.factory.lowers(robot)
 
 
 def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
     """The interval across which the arm of a robot in a lane reaches to the line of its finger, to
     the left of its carriage's line [m]; (0, 0) without a lane."""
     hand = layout.hand(robot)
-    if hand is None or hand.kind != "below":
+    if hand is None or not hand.kind.rises:
         return 0.0, 0.0
     aside, half = layout.mount(robot).reached(hand)[0][1], hand.width / 2
     return (min(0.0, aside - half), max(0.0, aside + half)) if abs(aside) > FINGER / 2 else (0, 0)

@@ -8,10 +8,10 @@ import numpy as np
 
 from factory.floor.layout.dimensions import BEAM, FINGER
 from factory.floor.layout.hands.apart import HandsApart, Swept
-from factory.floor.layout.hands.hand import Kind
 from factory.floor.layout.hands.holding import Holding, held
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.places import Places
-from factory.floor.layout.hands.reach import back, reach, under_beam
+from factory.floor.layout.hands.reach import back
 from factory.floor.layout.hands.surfaces import Way, swept
 from factory.support.arrays import Array
 from factory.theory.plant.operation import Operation
@@ -30,9 +30,9 @@ class Lowered:
 
     def onto(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
         """The sweep of a hand relative to each input that is lowered to a carrier."""
-        ends = reach(self.holding.product, kind, places.at, places.radius, u)
-        low, high = under_beam(kind, *ends, places.radius)
-        if kind != "below":
+        ends = kind.boxes(self.holding.product, places.at, places.radius, u)
+        low, high = kind.over_all(*ends, places.radius)
+        if kind.tall:
             low, high = swept(low, high, back(u))
         for operation in self.holding.made(robot):
             for boxes in self.boxes(operation, robot, [(u[1], u[0]), (-u[1], -u[0])]):
@@ -41,7 +41,7 @@ class Lowered:
     def beams(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
         """The sweep of the beam over what a robot holds from above and has from a feeder, relative
         to an input that is lowered where it delivers. Its mast stands against t, beside that."""
-        if kind != "above" or not self.holding.is_fed(robot):
+        if not kind.hangs or not self.holding.is_fed(robot):
             return
         across, side = (0, t[0]) if t[0] else (1, t[1])
         box = self.holding.box(held(self.holding.factory, robot))

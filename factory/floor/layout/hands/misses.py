@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.layout.hands.hand import Kind, Point3
+from factory.floor.layout.hands.hand import Point3
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.surfaces import Way
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, Position

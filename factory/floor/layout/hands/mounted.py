@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
 from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_LOW, FINGER_TOP
 from factory.floor.layout.guidepath import Extent, Point2
 from factory.floor.layout.hands.clamp import PALM
-from factory.floor.layout.hands.hand import AIR, PAD, ROOT, Hand, Point3
+from factory.floor.layout.hands.hand import PAD, ROOT, Hand, Point3
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, NONE, Kind
+from factory.floor.layout.hands.reach import AIR
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
 Round = Literal["", "x", "z"]
@@ -64,13 +66,7 @@ class Mount:
 
 def limbs_of(hand: Hand, mount: Mount) -> tuple[Limb, ...]:
     """The limbs of a mounted hand; empty if nothing can hold."""
-    if hand.kind == "below":
-        return tuple(_below(mount, hand))
-    if hand.kind == "behind":
-        return tuple(_behind(mount, hand))
-    if hand.kind == "above":
-        return tuple(_above(mount, hand))
-    return ()
+    return tuple(LIMBS[hand.kind](mount, hand))
 
 
 def grip_of(hand: Hand, mount: Mount) -> Extent | None:
@@ -153,3 +149,12 @@ def _rod(
 ) -> Iterator[Limb]:
     if high - low > 1e-5:
         yield Limb(name, (x - radius, y - radius, low), (x + radius, y + radius, high), "z", lifted)
+
+
+LIMBS: Mapping[Kind, Callable[[Mount, Hand], Iterable[Limb]]] = {
+    NONE: lambda _mount, _hand: (),
+    BELOW: _below,
+    BEHIND: _behind,
+    ABOVE: _above,
+}
+"""The limbs of the kinds of hands."""

@@ -10,9 +10,9 @@ import numpy as np
 
 from factory.floor.layout.hands.apart import Swept
 from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.hands.hand import Kind
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import IN_THE_WAY
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, hit, near
@@ -37,7 +37,7 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
     for robot, tours in enumerate(hands.tours.of):
         frames = _frames(hands.holding, tours)
         chosen = [hands.hand(robot, u, t) for u, t in frames]
-        if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
+        if chosen and all(hand is not None and not hand.kind.holds for hand in chosen):
             unlike = tuple(dict.fromkeys(hands.tours.alike(tours)))
             labels = tuple(held(factory, tour) for tour in unlike) if len(unlike) > 1 else ()
             lacking = [t for t in unlike if not (labels and hands.one_hand.fits(t))]
@@ -187,7 +187,7 @@ class _Search:
         """Possible obstacles, each with its reason and the places (n,) at which it matters."""
         robot, label, always = self.robot, self.label, np.ones(len(places), bool)
         _, first = self.in_the_way.checks(robot, label, kind, places, frames)
-        is_fed = self.holding.is_fed(robot) and kind != "below"
+        is_fed = self.holding.is_fed(robot) and kind.tall
         for u, t in frames:
             for why, ways in self.in_the_way.met(robot, kind, places, u, t):
                 yield why, always, ways

@@ -29,9 +29,10 @@ from factory.floor.layout.hands.groups import (
     on_one_line,
     together,
 )
-from factory.floor.layout.hands.hand import Hand, Kind
+from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.in_the_way import InTheWay
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, Kind
 from factory.floor.layout.hands.places import Places, centre_of, strain_of_two
 from factory.floor.layout.hands.reach import halves
 from factory.floor.layout.hands.surfaces import Way
@@ -73,15 +74,15 @@ class OneHand:
     def _kinds(self, tour: int) -> tuple[Kind, ...]:
         holding = self.in_the_way.holding
         if self._jaws(tour):
-            return ("above", "below") if holding.factory.lowers(tour) else ("below", "above")
+            return (ABOVE, BELOW) if holding.factory.lowers(tour) else (BELOW, ABOVE)
         if holding.is_fed(tour) and holding.is_carrier(tour):
-            return "below", "behind"  # the tower of a hand above stands beside a feeder's part
+            return BELOW, BEHIND  # the tower of a hand above stands beside a feeder's part
         last = holding.last(tour)
         if not holding.factory.robots[tour].travels:
-            return ("above",)
+            return (ABOVE,)
         if last.lowered >= 0 and last.robots[last.lowered] == tour:
-            return "above", "behind", "below"
-        return "below", "behind", "above"
+            return ABOVE, BEHIND, BELOW
+        return BELOW, BEHIND, ABOVE
 
     def fits(self, tour: int) -> frozenset[Fit]:
         """The ways in which a hand of a line could hold the label of a tour: frame, kind and height
@@ -94,7 +95,7 @@ class OneHand:
             for kind in self._kinds(tour):
                 if self._possible(kind, tour, frames):
                     places, free, _ = self._clear(kind, tour, frames)
-                    lifted = holding.factory.goes_up(tour) or kind == "behind"
+                    lifted = holding.factory.goes_up(tour) or kind.level
                     heights = np.unique(np.round(places.at[free, 2], 4)) * (not lifted)
                     fits |= {(u, t, kind, z) for u, t in frames for z in heights.tolist()}
         return frozenset(fits)
@@ -117,7 +118,7 @@ class OneHand:
         if hand.kind not in self._kinds(tour) or not self._possible(hand.kind, tour, frames):
             return ()
         groups = self._groups(hand.kind, tour, frames, 0.0)
-        if hand.kind == "below" and not self._jaws(tour):
+        if hand.kind.rises and not self._jaws(tour):
             groups = self._paired(tour, groups)
         at = groups.places.at[groups.chosen]
         ends = np.array((hand.places[0], hand.places[-1]))
@@ -127,7 +128,7 @@ class OneHand:
             return ()
         wider = np.abs(groups.places.radius[groups.chosen] - hand.radius).max(axis=1)
         same = groups.among(np.lexsort((wider, away.round(6)))[:1])
-        if hand.kind == "behind" and not self._below_pads([tour], [same]):
+        if hand.kind.level and not self._below_pads([tour], [same]):
             return ()
         return self._hands(hand.kind, [tour], frames, hand.tip, [same])
 
@@ -136,7 +137,7 @@ class OneHand:
         For one tour each place has its best tip."""
         alone = len(tours) == 1
         lifted = alone or self.in_the_way.holding.factory.goes_up(tours[0])
-        lifted |= kind == "behind" and tours[0] in self.adjusted
+        lifted |= kind.level and tours[0] in self.adjusted
         possible = all(self._possible(kind, tour, frames) for tour in tours)
         if not possible or not (lifted or self._level(tours)):
             return ()
@@ -152,7 +153,7 @@ class OneHand:
             if not all(map(len, options)):
                 continue
             cost, by, chosen = _level(options, *frames[0], lifted)
-            if cost < lowest and (kind != "behind" or self._below_pads(tours, chosen)):
+            if cost < lowest and (not kind.level or self._below_pads(tours, chosen)):
                 best, lowest = self._hands(kind, tours, frames, by, chosen), cost
             if not lowest:
                 break
@@ -165,7 +166,7 @@ class OneHand:
         options = list[Groups]()
         for tour in tours:
             groups = self._groups(kind, tour, frames, radius)
-            if kind == "below" and not (radius or groups.easy or self._jaws(tour)):
+            if kind.rises and not (radius or groups.easy or self._jaws(tour)):
                 groups = self._paired(tour, groups)
             options.append(groups)
             if not len(groups):
@@ -230,7 +231,7 @@ class OneHand:
         clear, first = places.chosen(free), first[free]
         waits, every = self.in_the_way.waits(tour, kind, clear, frames), np.arange(len(clear))
         alone = np.stack([every, every], axis=1)
-        carries = kind == "below" and self.in_the_way.holding.is_carrier(tour)
+        carries = kind.rises and self.in_the_way.holding.is_carrier(tour)
         served = self._served(tour, clear) if carries else np.zeros(len(clear))
         return Groups(clear, alone, clear.share, clear.pinned, served, first, waits)
 
@@ -265,7 +266,8 @@ class OneHand:
             sides = []
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != tour and label != NOPART:
-                    under = holding.places(self._label(guest), "below", 2, -1)
+                    anyhow = 1.0, 0.0  # the underside is the same for all headings
+                    under = holding.places(self._label(guest), BELOW, anyhow)
                     at, half = under.at[:, across], halves(under.radius)
                     cost = bad(under.share, under.pinned)
                     before = least(at + half, cost, line - spare)
@@ -289,7 +291,7 @@ class OneHand:
         """One hand, in its place on each label."""
         wait = round(max(float(one.waits[0]) for one in chosen), 6)
         points, beams = [one.points() for one in chosen], [0.0] * len(chosen)
-        if kind == "above":
+        if kind.hangs:
             apart, heights = self.in_the_way.apart, [z for ((_, _, z), *_) in points]
             over = [
                 apart.beam(tour, one.places.chosen(one.chosen[0]), frames)

@@ -10,7 +10,8 @@ from math import floor, log10, pi
 import numpy as np
 
 from factory.floor.geometry.solids import Product
-from factory.floor.layout.hands.hand import Kind, Point3
+from factory.floor.layout.hands.hand import Point3
+from factory.floor.layout.hands.kinds import Kind
 from factory.floor.layout.hands.outermost import outermost
 from factory.floor.layout.hands.surfaces import Surfaces
 from factory.floor.layout.hands.tips import Tip, shares, tip
@@ -160,7 +161,7 @@ def places(
     across = [a for a in range(3) if a != axis]
     low, high = np.moveaxis(surfaces.boxes(parts), 1, 0)
     points = _tried(low, high, centre, side)
-    if kind == "below":
+    if kind.rises:
         points = np.concatenate([points, _lines(low, high, centre)])
     if on_raster:
         points = np.concatenate([points, _raster(low, high, product.middle, across)])
