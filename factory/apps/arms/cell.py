@@ -22,7 +22,6 @@ from factory.apps.arms.holds import UP, facing_up, product_of, quaternion
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
-from factory.floor.layout.hands.kinds import ABOVE, BEHIND
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""
@@ -163,7 +162,7 @@ class CellChains:
     def hand(self, label: str) -> Hand:
         grip = self.grips[label]
         x, y, z = map(float, grip.tip)
-        return Hand(ABOVE if grip.normal[2] else BEHIND, ((x, y, z),), grip.radius, tip=grip.kind)
+        return Hand.on_face(grip.normal, (x, y, z), grip.radius, grip.kind)
 
     def add(self, robot: int, section: Mapping[str, Element]) -> None:
         of = self.factory.robots[robot]

@@ -15,7 +15,7 @@ import numpy as np
 from factory.api import Factory, Hand, Layout
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
-from factory.floor.layout.hands.kinds import BELOW, NONE
+from factory.floor.layout.hands.kinds import BELOW
 from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import Places, centre_of
 from factory.floor.layout.hands.surfaces import Way
@@ -119,7 +119,7 @@ class _Choice:
         at, radius = np.array(before.places), np.full(len(before.places), before.radius)
         self.in_the_way.apart.kept[guest] = before
         free = self.in_the_way.apart.own_side(
-            guest, BELOW, Places(at, radius, radius, radius, radius), u, t
+            guest, before.kind, Places(at, radius, radius, radius, radius), u, t
         )
         if free.all():
             return before
@@ -148,4 +148,4 @@ class _Choice:
             return hands[0]
         parts = self.holding.factory.contents[label]
         x, y, z = centre_of(self.holding.product, parts)[1].tolist()
-        return Hand(NONE, ((x, y, z),), share=most)
+        return Hand.nothing((x, y, z), most)

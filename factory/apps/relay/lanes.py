@@ -12,7 +12,7 @@ from factory.floor.layout.dimensions import FINGER, Clearance
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
-from factory.floor.layout.hands.kinds import NONE, Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import widths
 from factory.floor.layout.hands.surfaces import Way, swept
@@ -38,7 +38,7 @@ class Lane:
 SAME = 1e-5
 """Places that are no further apart across are on one line [m]."""
 
-NOTHING = Hand(NONE, ((0.0, 0.0, 0.0),))
+NOTHING = Hand.nothing((0.0, 0.0, 0.0))
 """Where there is no hand."""
 
 
@@ -88,7 +88,7 @@ class HandsApartInLanes(HandsApart):
         super().__init__(holding, hand_of)
         self.lanes, self.kept = lanes, dict[int, Hand]()
 
-    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
+    def own_side(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Truth:
         if robot in self.kept:
             kept, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
@@ -109,7 +109,7 @@ class HandsApartInLanes(HandsApart):
         return super().crossing(robot, places, u, t)
 
     def carriers_hand(
-        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         if not self.holding.gives(robot):
             yield from super().carriers_hand(robot, kind, places, u, t)
@@ -131,28 +131,33 @@ class InTheWayInLanes(InTheWay):
         self.apart = HandsApartInLanes(holding, lanes, hand_of)
 
     def possible(
-        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+        self, robot: int, label: str, kind: HandKind, frames: Sequence[tuple[Way, Way]]
     ) -> bool:
         """Always true: a lane has two ends."""
         return True
 
     def checks(
-        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+        self,
+        robot: int,
+        label: str,
+        kind: HandKind,
+        places: Places,
+        frames: Sequence[tuple[Way, Way]],
     ) -> tuple[dict[str, Truth], Truth]:
         """Not cached, since lanes and settled hands change."""
         return self._looked_at(robot, label, kind, places, frames)
 
     def _passing(
-        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Passed:
         return self._looked_past(robot, label, kind, places, u, t)
 
-    def _going_on(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Array:
+    def _going_on(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
             return np.zeros(len(places))
         return super()._going_on(robot, kind, places, u, t)
 
-    def _leaving(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: HandKind, places: Places, u: Way) -> Iterator[Swept]:
         """Also the sweep of a hand as it comes to take over, from ahead."""
         low, high = self.reach(kind, places, u)
         if self.holding.takes(robot):
@@ -165,7 +170,7 @@ class InTheWayInLanes(InTheWay):
             yield from super()._leaving(robot, kind, places, u)
 
     def coming(
-        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         if not self.holding.takes(robot):
             yield from super().coming(robot, label, kind, places, u, t)

@@ -9,7 +9,7 @@ import numpy as np
 from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_TOP, PAYLOAD
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back, halves
 from factory.floor.layout.hands.surfaces import Way, swept
@@ -41,14 +41,14 @@ class HandsApart:
         self.holding, self.hand_of = holding, hand_of
         self._middles: dict[tuple[int, int], float | None] = {}
 
-    def over_fingers(self, kind: Kind, places: Places) -> Truth:
+    def over_fingers(self, kind: HandKind, places: Places) -> Truth:
         """Whether a hand behind stays over the fingers of those below (n,)."""
         if not kind.level:
             return np.ones(len(places), bool)
         least = self.holding.product.low[2] - UNDER
         return np.asarray(places.at[:, 2] - halves(places.radius) >= least)
 
-    def own_side(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Truth:
+    def own_side(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Truth:
         """Whether a hand at a place stays on its own side: of the carrier's line if the carrier is
         held from below too, otherwise of the payload of another robot that comes from the opposite
         side."""
@@ -102,7 +102,7 @@ class HandsApart:
         return height
 
     def carriers_hand(
-        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         """The sweep of a hand with everything behind it, against the carrier's hand: a tall one, as
         its lift rises, with everything behind it, since both are there at once; one below the

@@ -21,7 +21,6 @@ from factory.floor.geometry.solids import Product
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay
-from factory.floor.layout.hands.kinds import NONE
 from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import PUSH, centre_of
 from factory.floor.layout.hands.surfaces import Way
@@ -211,4 +210,4 @@ class Hands:
     def _nowhere(self, label: str) -> Hand:
         """No hand, at the centre of mass of the payload."""
         x, y, z = centre_of(self.holding.product, self.holding.factory.contents[label])[1].tolist()
-        return Hand(NONE, ((float(x), float(y), float(z)),))
+        return Hand.nothing((float(x), float(y), float(z)))

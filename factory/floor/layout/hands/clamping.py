@@ -15,7 +15,7 @@ import numpy as np
 from factory.floor.layout.hands.clamp import Clamp
 from factory.floor.layout.hands.hand import Point3
 from factory.floor.layout.hands.holding import Holding, held
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import AIR
 from factory.floor.layout.hands.surfaces import Way
@@ -50,7 +50,7 @@ class Clamping:
         return Clamp(jaws, ()).length if jaws else 0.0
 
     def clamp(
-        self, tours: Sequence[int], kind: Kind, points: Sequence[Point3], u: Way
+        self, tours: Sequence[int], kind: HandKind, points: Sequence[Point3], u: Way
     ) -> Clamp | None:
         """The clamp of a robot that heads along u, whose pad is at a point of what it holds on each
         of its tours; None without jaws."""
@@ -64,7 +64,7 @@ class Clamping:
         rows = (tuple(closed[0].round(6).tolist()) for closed in each)
         return Clamp(jaws, tuple(rows), kind.up)
 
-    def places(self, robot: int, kind: Kind, places: Places, u: Way) -> Places:
+    def places(self, robot: int, kind: HandKind, places: Places, u: Way) -> Places:
         """Those of some places between whose sides the jaws of a robot can close, with the share of
         their strength that is used; all of them without jaws."""
         jaws = self.jaws(robot)
@@ -79,7 +79,7 @@ class Clamping:
         used = shares((terms @ load.swapaxes(0, 1)).swapaxes(1, 2)).max(axis=-1, initial=0.0)
         return replace(places, share=used, pinned=used, covered=np.ones(len(places)))
 
-    def columns(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Places]:
+    def columns(self, robot: int, kind: HandKind, places: Places, u: Way) -> Iterator[Places]:
         """The jaws of a robot at each place, as columns of a kind of hand."""
         if not (self.jaws(robot) and len(places)):
             return
@@ -93,7 +93,7 @@ class Clamping:
             at[:, 2] += kind.up * (jaw.high[2] + AIR)
             yield replace(places, at=at, radius=half)
 
-    def _closed(self, robot: int, kind: Kind, at: Array, u: Way) -> tuple[Array, Truth]:
+    def _closed(self, robot: int, kind: HandKind, at: Array, u: Way) -> tuple[Array, Truth]:
         """How far the jaws close over pads at places (n, 3) of what a robot takes (n, jaws) [m];
         and whether all can (n,): it is not too wide there, nor too narrow."""
         jaws = self.jaws(robot)
@@ -103,7 +103,7 @@ class Clamping:
         fits = np.isfinite(closed) & (closed >= OPEN) & (closed <= strokes)
         return closed, np.asarray(fits.all(axis=1))
 
-    def _widest(self, robot: int, kind: Kind, at: Array, jaw: Jaw, u: Way) -> Array:
+    def _widest(self, robot: int, kind: HandKind, at: Array, jaw: Jaw, u: Way) -> Array:
         """How far beside pads at places (n, 3) what a robot takes reaches where a jaw closes (n,)
         [m]; -inf where it does not reach there. The surface of a convex body is dome-shaped seen
         from outside, so lines round the widest of a grid come ever closer to the widest place."""

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.clamp import Clamp
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, NONE, HandKind
 from factory.floor.layout.hands.reach import SLENDER
 from factory.floor.layout.hands.tips import TipName
+from factory.support.arrays import Array
 
 Point3 = tuple[float, float, float]
 
@@ -43,7 +44,7 @@ class Hand:
         clamp: the jaws that close over its tip; None without.
     """
 
-    kind: Kind
+    kind: HandKind
     places: tuple[Point3, ...]
     radius: float = 0.003
     beam: float = 0.0
@@ -53,6 +54,16 @@ class Hand:
     wait: float = 0.0
     covered: tuple[float, ...] = (1.0,)
     clamp: Clamp | None = None
+
+    @classmethod
+    def nothing(cls, at: Point3, share: float = 0.0) -> Hand:
+        """The hand that holds nothing at a place, using at most a share of its strength."""
+        return cls(NONE, (at,), share=share)
+
+    @classmethod
+    def on_face(cls, normal: Array, at: Point3, radius: float, tip: TipName) -> Hand:
+        """A hand with one tip on a face with a normal (3,): from above, or from behind."""
+        return cls(ABOVE if normal[2] else BEHIND, (at,), radius, tip=tip)
 
     @property
     def half(self) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import axis_of, fed_of
 from factory.floor.layout.hands.hand import Hand, Point3
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
 from factory.floor.layout.layout import carriers
@@ -53,7 +53,7 @@ class Holding:
         for each in factory.robots:
             gear = (factory.operations[number] for number in each.operations)
             self._made.append([o for o in gear if o.carrier == each.index])
-        self._places: dict[tuple[str, Kind, tuple[int, int], float], Places] = {}
+        self._places: dict[tuple[str, HandKind, tuple[int, int], float], Places] = {}
         self._boxes: dict[str, Array] = {}
         self._box: dict[str, Array] = {}
         self._loads: dict[str, Loads] = {}
@@ -88,7 +88,7 @@ class Holding:
         """The operation that a robot delivers to."""
         return self.factory.last(robot)
 
-    def places(self, label: str, kind: Kind, heading: Way, radius: float = 0.0) -> Places:
+    def places(self, label: str, kind: HandKind, heading: Way, radius: float = 0.0) -> Places:
         """The places of a sub-assembly for a kind of hand of a robot with a heading, cached: with
         the best pad at each, or with one of a `radius` [m]."""
         side = kind.side(heading)

@@ -17,7 +17,7 @@ from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.clamping import Clamping
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding, held
-from factory.floor.layout.hands.kinds import Boxes, Kind
+from factory.floor.layout.hands.kinds import Boxes, HandKind
 from factory.floor.layout.hands.lowered import Lowered
 from factory.floor.layout.hands.places import SMALL, Places
 from factory.floor.layout.hands.reach import back, halves
@@ -41,6 +41,9 @@ IN_THE_WAY = {
 
 PLAY = 1e-6
 """Places are no further than this beside the box of a sub-assembly [m]."""
+
+Frames = Sequence[tuple[Way, Way]]
+"""How a robot may lie: along u, to a carrier that lies along t."""
 
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
@@ -77,9 +80,7 @@ class InTheWay:
         self._passed: dict[tuple[object, ...], Passed] = {}
         self._onward: dict[int, Array] = {}
 
-    def possible(
-        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
-    ) -> bool:
+    def possible(self, robot: int, label: str, kind: HandKind, frames: Frames) -> bool:
         """Whether any of a sub-assembly is on the side of its carrier's line on which a hand stays,
         in every frame; if not, none of its places needs to be computed."""
         box, none = self.holding.box(label) + np.array([[-PLAY], [PLAY]]), np.zeros(2)
@@ -87,9 +88,7 @@ class InTheWay:
         sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
         return all(bool(side.any()) for side in sides)
 
-    def on_side(
-        self, robot: int, kind: Kind, frames: Sequence[tuple[Way, Way]], radius: float = 0.0
-    ) -> Places:
+    def on_side(self, robot: int, kind: HandKind, frames: Frames, radius: float = 0.0) -> Places:
         """The places on the side of what a robot takes that a kind of hand holds, with the best pad
         at each or, if it fits, with one of a `radius` [m]."""
         u, _ = frames[0]
@@ -97,7 +96,12 @@ class InTheWay:
         return self.clamping.places(robot, kind, places, u)
 
     def checks(
-        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+        self,
+        robot: int,
+        label: str,
+        kind: HandKind,
+        places: Places,
+        frames: Frames,
     ) -> tuple[dict[str, Truth], Truth]:
         """For each obstacle whether a hand at each place (n,) is clear of it in every frame; and
         whether it has to be there before its payload. Cached."""
@@ -111,9 +115,7 @@ class InTheWay:
             self._checked[key] = free, first
         return self._checked[key]
 
-    def waits(
-        self, robot: int, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> Array:
+    def waits(self, robot: int, kind: HandKind, places: Places, frames: Frames) -> Array:
         """Distance that a hand at each place (n,) goes back, in any frame, until its carrier's next
         operation may start [m]."""
         waits = np.zeros(len(places))
@@ -124,7 +126,12 @@ class InTheWay:
         return waits
 
     def _looked_at(
-        self, robot: int, label: str, kind: Kind, places: Places, frames: Sequence[tuple[Way, Way]]
+        self,
+        robot: int,
+        label: str,
+        kind: HandKind,
+        places: Places,
+        frames: Frames,
     ) -> tuple[dict[str, Truth], Truth]:
         free = {why: np.ones(len(places), bool) for why in IN_THE_WAY}
         free["weak"] &= places.pinned <= STRONG
@@ -156,7 +163,7 @@ class InTheWay:
         return free, first
 
     def _passing(
-        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Passed:
         """Contacts of the hand of a robot that heads along u. Cached: the sense of its carrier
         along t does not matter."""
@@ -166,7 +173,7 @@ class InTheWay:
         return self._passed[key]
 
     def _looked_past(
-        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Passed:
         joined = list(self.joined(robot, kind, places, u, t))
         return Passed(
@@ -178,7 +185,7 @@ class InTheWay:
         )
 
     def met(
-        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[tuple[str, Swept]]:
         """The obstacles of a hand at each place, each with its reason."""
         for ways in (
@@ -194,11 +201,11 @@ class InTheWay:
         ):
             yield "lowered", ways
 
-    def reach(self, kind: Kind, places: Places, u: Way) -> Boxes:
+    def reach(self, kind: HandKind, places: Places, u: Way) -> Boxes:
         """The boxes of hands of a kind at some places."""
         return kind.boxes(self.holding.product, places.at, places.radius, u)
 
-    def _facing(self, kind: Kind, places: Places, u: Way) -> Boxes:
+    def _facing(self, kind: HandKind, places: Places, u: Way) -> Boxes:
         """The same among what other robots hold, with ROOM ahead of a face behind or above."""
         low, high = self.reach(kind, places, u)
         return kind.with_room(low, high, u, ROOM) if kind.tall else (low, high)
@@ -228,7 +235,7 @@ class InTheWay:
         end = (boxes[:, :, along] * ahead).max() - PUSHED
         return np.asarray(sides[0] | sides[1] | (end > places.at[:, along] * ahead + half))
 
-    def _leaving(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: HandKind, places: Places, u: Way) -> Iterator[Swept]:
         """The sweep of a hand relative to the parts that it has delivered to, with their boxes, as
         it comes and leaves: along its heading, and downwards if it lowers its payload."""
         last, (low, high) = self.holding.last(robot), self.reach(kind, places, u)
@@ -254,7 +261,9 @@ class InTheWay:
             if other != NOPART and (guest != robot or lifted):
                 yield (*gone, self.holding.boxes(other))
 
-    def _raised(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
+    def _raised(
+        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
         """The same for a hand above whose lift is up: it goes home over what it has delivered to,
         which may go on along t meanwhile, or either way if its carrier turns."""
         if kind.hangs and self.holding.factory.lowers(robot):
@@ -264,7 +273,7 @@ class InTheWay:
             for side in (back(t), t)[: 1 + (self.holding.on[robot] in self.holding.turning)]:
                 yield (*swept(low, high, back(u), side), boxes)
 
-    def _going_on(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Array:
+    def _going_on(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Array:
         """Distance that a hand has to go back (n,) [m], as its lift rises, until its carrier's next
         operation may start, which leaves along t, or either way if it turns."""
         if self.holding.factory.drops(self.holding.last(robot).index):
@@ -292,7 +301,7 @@ class InTheWay:
         return self._onward[last.index]
 
     def coming(
-        self, robot: int, label: str, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         """The sweep of a hand relative to what it takes, which is there before it comes home
         against u: a part, or inputs from either side."""
@@ -310,7 +319,7 @@ class InTheWay:
             yield (*swept(low, high, u), part_boxes)
 
     def joined(
-        self, robot: int, kind: Kind, places: Places, u: Way, t: Way
+        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
     ) -> Iterator[tuple[bool, Swept]]:
         """The sweep of a hand relative to each input of its operations, which comes from either
         side while the hand is there, and as its lift rises; with whether that is so in any case,

@@ -20,7 +20,7 @@ Boxes = tuple[Array, Array]
 """The lower and upper corners (n, 3) of boxes [m]."""
 
 
-class Kind(Named):
+class HandKind(Named):
     """A kind of hand, by its name; in itself that of a hand which holds nothing.
 
     Attributes:
@@ -70,7 +70,7 @@ class Kind(Named):
         return low, high
 
 
-class _Below(Kind):
+class _Below(HandKind):
     rises, up = True, 1
 
     def boxes(self, product: Product, at: Array, radius: Array, heading: Way) -> Boxes:
@@ -80,7 +80,7 @@ class _Below(Kind):
         return low, high
 
 
-class _Behind(Kind):
+class _Behind(HandKind):
     level = True
 
     def toward(self, heading: Way) -> tuple[float, float, float]:
@@ -95,7 +95,7 @@ class _Behind(Kind):
         return low, high
 
 
-class _Above(Kind):
+class _Above(HandKind):
     hangs, up = True, -1
 
     def boxes(self, product: Product, at: Array, radius: Array, heading: Way) -> Boxes:
@@ -109,7 +109,7 @@ class _Above(Kind):
         return low - more, high + more
 
 
-NONE = Kind("none")
+NONE = HandKind("none")
 BELOW, BEHIND, ABOVE = _Below("below"), _Behind("behind"), _Above("above")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from factory.floor.layout.dimensions import BEAM, FINGER
 from factory.floor.layout.hands.apart import HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import back
 from factory.floor.layout.hands.surfaces import Way, swept
@@ -28,7 +28,7 @@ class Lowered:
     def __init__(self, holding: Holding, apart: HandsApart) -> None:
         self.holding, self.apart = holding, apart
 
-    def onto(self, robot: int, kind: Kind, places: Places, u: Way) -> Iterator[Swept]:
+    def onto(self, robot: int, kind: HandKind, places: Places, u: Way) -> Iterator[Swept]:
         """The sweep of a hand relative to each input that is lowered to a carrier."""
         ends = kind.boxes(self.holding.product, places.at, places.radius, u)
         low, high = kind.over_all(*ends, places.radius)
@@ -38,7 +38,7 @@ class Lowered:
             for boxes in self.boxes(operation, robot, [(u[1], u[0]), (-u[1], -u[0])]):
                 yield low, high, boxes
 
-    def beams(self, robot: int, kind: Kind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
+    def beams(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Iterator[Swept]:
         """The sweep of the beam over what a robot holds from above and has from a feeder, relative
         to an input that is lowered where it delivers. Its mast stands against t, beside that."""
         if not kind.hangs or not self.holding.is_fed(robot):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from factory.floor.layout.hands.hand import Point3
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.surfaces import Way
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, Position
@@ -56,7 +56,7 @@ class Miss:
     strength that is used by a pin, the `box` (2, 3) of the hand there, which may be endless, the
     `heading` of its robot, and what is in its way; what is in the way of most places (`why`)."""
 
-    kind: Kind
+    kind: HandKind
     heading: Way
     tried: Array = field(compare=False, repr=False)
     at: Point3 | None = None
@@ -130,7 +130,7 @@ class NoGrip:
     misses: tuple[Miss, ...]
     position: Position | None = field(default=None, compare=False)
     line: tuple[str, ...] = ()
-    ways: tuple[tuple[Kind, tuple[str, ...]], ...] = ()
+    ways: tuple[tuple[HandKind, tuple[str, ...]], ...] = ()
 
     @property
     def shared(self) -> bool:
@@ -155,7 +155,7 @@ class NoGrip:
     def _told(self, message: str, hint: str, about: str) -> Diagnostic:
         return Diagnostic("NoGrip", message, self.position, hint, "parts have no grip", about)
 
-    def _way(self, kind: Kind, labels: tuple[str, ...]) -> str:
+    def _way(self, kind: HandKind, labels: tuple[str, ...]) -> str:
         """The labels of a line that a kind of hand can hold, in words."""
         if labels == self.line:
             return f"{kind} it can hold each, but not in one place of the hand"

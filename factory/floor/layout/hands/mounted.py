@@ -10,7 +10,7 @@ from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_LOW, FINGER_TOP
 from factory.floor.layout.guidepath import Extent, Point2
 from factory.floor.layout.hands.clamp import PALM
 from factory.floor.layout.hands.hand import PAD, ROOT, Hand, Point3
-from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, NONE, Kind
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, NONE, HandKind
 from factory.floor.layout.hands.reach import AIR
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
@@ -151,7 +151,7 @@ def _rod(
         yield Limb(name, (x - radius, y - radius, low), (x + radius, y + radius, high), "z", lifted)
 
 
-LIMBS: Mapping[Kind, Callable[[Mount, Hand], Iterable[Limb]]] = {
+LIMBS: Mapping[HandKind, Callable[[Mount, Hand], Iterable[Limb]]] = {
     NONE: lambda _mount, _hand: (),
     BELOW: _below,
     BEHIND: _behind,

@@ -12,7 +12,7 @@ from factory.floor.layout.hands.apart import Swept
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import IN_THE_WAY
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.surfaces import Way, hit, near
@@ -61,7 +61,7 @@ def _frames(holding: Holding, tours: Sequence[int]) -> list[tuple[Way, Way]]:
     return [frame for frame in frames if admits(frame[0])] or frames
 
 
-def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[Kind, tuple[str, ...]]]:
+def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[HandKind, tuple[str, ...]]]:
     """For each kind of hand which labels of a line it can hold, one by one."""
     fits = {held(hands.holding.factory, tour): hands.one_hand.fits(tour) for tour in tours}
     for kind in hands.one_hand.kinds(tours):
@@ -95,7 +95,7 @@ class _Search:
             factory.by_label[self.label].position,
         )
 
-    def nearest(self, kind: Kind) -> Miss:
+    def nearest(self, kind: HandKind) -> Miss:
         """The nearest miss of a kind of hand, over all frames."""
         best: tuple[tuple[bool, int, float], Frames, Places] | None = None
         for frames in self.all_frames:
@@ -126,21 +126,21 @@ class _Search:
             self._why(kind, frames),
         )
 
-    def _why(self, kind: Kind, frames: Frames) -> str:
+    def _why(self, kind: HandKind, frames: Frames) -> str:
         """The most frequent obstacle, in words."""
         places = self.in_the_way.on_side(self.robot, kind, frames)
         checks, _ = self.in_the_way.checks(self.robot, self.label, kind, places, frames)
         why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
         return f"{len(places) - int(free.sum())} of {len(places)} places: {IN_THE_WAY[why]}"
 
-    def _counted(self, kind: Kind, places: Places, frames: Frames) -> Index:
+    def _counted(self, kind: HandKind, places: Places, frames: Frames) -> Index:
         """Number of obstacles of a hand at each place (n,)."""
         things: dict[tuple[str, str], Truth] = {}
         for key, met, _, _ in self._met(kind, places, frames):
             things[key] = things.get(key, np.zeros(len(places), bool)) | met
         return np.asarray(np.sum([np.zeros(len(places), np.intp), *things.values()], axis=0))
 
-    def _obstacles(self, kind: Kind, place: Places, frames: Frames) -> tuple[Obstacle, ...]:
+    def _obstacles(self, kind: HandKind, place: Places, frames: Frames) -> tuple[Obstacle, ...]:
         """The obstacles of a hand at one place."""
         things: dict[tuple[str, str], tuple[list[Array], list[Array]]] = {}
         for key, met, way, body in self._met(kind, place, frames):
@@ -155,7 +155,7 @@ class _Search:
         )
 
     def _met(
-        self, kind: Kind, places: Places, frames: Frames
+        self, kind: HandKind, places: Places, frames: Frames
     ) -> Iterator[tuple[tuple[str, str], Truth, tuple[Array, Array] | None, Array | None]]:
         """For each reason and part: whether it is in the way of a hand at each place (n,), the
         hand's sweep (low and high), and the part's box (2, 3); None for both if boxes do not
@@ -182,7 +182,7 @@ class _Search:
         return self._names[chosen[0]] if len(chosen) else ""
 
     def _ways(
-        self, kind: Kind, places: Places, frames: Frames
+        self, kind: HandKind, places: Places, frames: Frames
     ) -> Iterator[tuple[str, Truth, Swept]]:
         """Possible obstacles, each with its reason and the places (n,) at which it matters."""
         robot, label, always = self.robot, self.label, np.ones(len(places), bool)

@@ -31,8 +31,8 @@ from factory.floor.layout.hands.groups import (
 )
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import held
-from factory.floor.layout.hands.in_the_way import InTheWay
-from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, Kind
+from factory.floor.layout.hands.in_the_way import Frames, InTheWay
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, HandKind
 from factory.floor.layout.hands.places import Places, centre_of, strain_of_two
 from factory.floor.layout.hands.reach import halves
 from factory.floor.layout.hands.surfaces import Way
@@ -47,10 +47,7 @@ RISING = 0.075
 """A tower behind is no higher than this over the top of what its robot takes [m]: so far a feeder's
 pad has risen when the tower, which is 20 mm behind, comes to where it was."""
 
-Frames = Sequence[tuple[Way, Way]]
-"""How a robot may lie: along u, to a carrier that lies along t."""
-
-Fit = tuple[Way, Way, Kind, float]
+Fit = tuple[Way, Way, HandKind, float]
 """A way to hold a label: u, t, the kind of hand, and the height of its tip."""
 
 
@@ -67,11 +64,11 @@ class OneHand:
     in_the_way: InTheWay
     adjusted: frozenset[int] = frozenset()
 
-    def kinds(self, tours: Sequence[int]) -> list[Kind]:
+    def kinds(self, tours: Sequence[int]) -> list[HandKind]:
         """The kinds of hand to try for all of some tours, in order."""
         return [k for k in self._kinds(tours[0]) if all(k in self._kinds(t) for t in tours)]
 
-    def _kinds(self, tour: int) -> tuple[Kind, ...]:
+    def _kinds(self, tour: int) -> tuple[HandKind, ...]:
         holding = self.in_the_way.holding
         if self._jaws(tour):
             return (ABOVE, BELOW) if holding.factory.lowers(tour) else (BELOW, ABOVE)
@@ -132,7 +129,7 @@ class OneHand:
             return ()
         return self._hands(hand.kind, [tour], frames, hand.tip, [same])
 
-    def of_kind(self, kind: Kind, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
+    def of_kind(self, kind: HandKind, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
         """The best hand of one kind, with the largest tips among equals; empty if there is none.
         For one tour each place has its best tip."""
         alone = len(tours) == 1
@@ -160,7 +157,7 @@ class OneHand:
         return best
 
     def _of_each(
-        self, kind: Kind, tours: Sequence[int], frames: Frames, radius: float
+        self, kind: HandKind, tours: Sequence[int], frames: Frames, radius: float
     ) -> list[Groups]:
         """The groups of each tour; empty if a tour has none."""
         options = list[Groups]()
@@ -173,7 +170,7 @@ class OneHand:
                 return []
         return options
 
-    def _radii(self, kind: Kind, tours: Sequence[int], frames: Frames) -> list[float]:
+    def _radii(self, kind: HandKind, tours: Sequence[int], frames: Frames) -> list[float]:
         """Possible radii of a tip for several tours, largest first [m]."""
         places = [self.in_the_way.on_side(tour, kind, frames) for tour in tours]
         most = min(float(of_tour.radius.max(initial=0.0)) for of_tour in places)
@@ -185,7 +182,7 @@ class OneHand:
         boxes = (self.in_the_way.holding.box(self._label(tour)) for tour in tours)
         return high - min(float(box[1, 2]) for box in boxes) <= RISING
 
-    def _possible(self, kind: Kind, tour: int, frames: Frames) -> bool:
+    def _possible(self, kind: HandKind, tour: int, frames: Frames) -> bool:
         return self.in_the_way.possible(tour, self._label(tour), kind, frames)
 
     def _level(self, tours: Sequence[int]) -> bool:
@@ -215,7 +212,7 @@ class OneHand:
         return held(self.in_the_way.holding.factory, tour)
 
     def _clear(
-        self, kind: Kind, tour: int, frames: Frames, radius: float = 0.0
+        self, kind: HandKind, tour: int, frames: Frames, radius: float = 0.0
     ) -> tuple[Places, Truth, Truth]:
         """The places for tips of a radius, or for the best tip at each if 0, for the label of a
         tour; whether each (n,) is clear in every frame, and whether the hand must be there
@@ -225,7 +222,7 @@ class OneHand:
         checks, first = self.in_the_way.checks(tour, label, kind, places, frames)
         return places, np.logical_and.reduce([*checks.values(), np.ones(len(places), bool)]), first
 
-    def _groups(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Groups:
+    def _groups(self, kind: HandKind, tour: int, frames: Frames, radius: float) -> Groups:
         """The clear places at which a hand with such tips holds the label of a tour, each alone."""
         places, free, first = self._clear(kind, tour, frames, radius)
         clear, first = places.chosen(free), first[free]
@@ -282,7 +279,7 @@ class OneHand:
 
     def _hands(
         self,
-        kind: Kind,
+        kind: HandKind,
         tours: Sequence[int],
         frames: Frames,
         by: TipName,

@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.hands.hand import Point3
-from factory.floor.layout.hands.kinds import Kind
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.outermost import outermost
 from factory.floor.layout.hands.surfaces import Surfaces
 from factory.floor.layout.hands.tips import Tip, shares, tip
@@ -147,7 +147,7 @@ def places(
     product: Product,
     parts: tuple[str, ...],
     side: tuple[int, int],
-    kind: Kind,
+    kind: HandKind,
     loads: Loads,
     on_raster: bool = False,
     wanted: Sequence[Point3] = (),
