@@ -92,6 +92,7 @@ class ProjectOptions:
                 "--robots": self.robots is not None,
                 "--platen": self.platen or self.tile is not None,
                 "--arm": self.arm is not None,
+                "[arms]": bool(kept.arms()),
                 "--floor": self.floor is not None,
                 "--parallel": bool(self.branches()),
                 "[lines]": bool(kept.lines()),
@@ -134,6 +135,10 @@ class ProjectOptions:
             from factory.apps.arms.ground import with_arm
 
             return with_arm(project, self.arm)
+        if arms := kept.arms():
+            from factory.apps.arms.ground import with_arms
+
+            return with_arms(project, arms, kept.at("arms"))
         if self.robots is not None or self.cycle is not None:
             return self._with_few_robots(project, silent)
         from factory.apps.few_robots.sharing import with_branches, with_lines, with_tees

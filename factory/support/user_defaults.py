@@ -37,7 +37,7 @@ OPTIONS: Mapping[str, object] = {
     "strict": True,
 }
 """The keys that are options of commands, each with an example; the others are those of Settings,
-LINES, TEES and PARALLEL."""
+LINES, TEES, PARALLEL and ARMS."""
 
 TEES = "tees"
 """A table of lists of two labels each: their robots share the last stretch of their ways."""
@@ -47,6 +47,9 @@ LINES = "lines"
 
 PARALLEL = "parallel"
 """A table of labels, each with how often the branch that brings it is there."""
+
+ARMS = "arms"
+"""A table of the arms of a cell, each a table of its own."""
 
 _KINDS = {
     str: "a text in quotes",
@@ -91,6 +94,10 @@ class Defaults:
         """The number of parallel branches of each label."""
         return dict(self.values.get(PARALLEL, {}))
 
+    def arms(self) -> dict[str, dict[str, Any]]:
+        """What is said of each arm of a cell, by its name."""
+        return dict(self.values.get(ARMS, {}))
+
     def at(self, key: str) -> Position:
         """The place of a key."""
         return key_position(self.path, self.text, key)
@@ -131,8 +138,11 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     if key == PARALLEL:
         what = f"labels with whole numbers from 1 to {MOST_BRANCHES}"
         return _fault_of_table(key, value, _is_number, what, "sub2 = 3")
+    if key == ARMS:
+        example = 'left = { type = "six", labels = ["part2"] }'
+        return _fault_of_table(key, value, lambda row: isinstance(row, dict), "tables", example)
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, TEES, PARALLEL], "keys")
+        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, TEES, PARALLEL, ARMS], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)

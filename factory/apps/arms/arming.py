@@ -13,12 +13,11 @@ from dataclasses import replace
 
 from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
 from factory.apps.arms.body import STEM_MASS, mass_of
+from factory.apps.arms.crew import RAILS, CellArm, dealt
 from factory.apps.arms.model import ArmModel
 from factory.theory.lang.template_reader import read_template
 from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
 from factory.theory.problem.robot_types import RobotType
-
-RAILS = "leave out --arm: rails make it"
 
 PLACE = """
 place = (R, j, ~, <a; b>, F) where
@@ -69,14 +68,14 @@ def robot_type(model: ArmModel) -> RobotType:
     return RobotType(model.kind, model.file, RobotBody(CARRIAGE, mass_of(model), (axis,)), "dot")
 
 
-def armed(project: Project, model: ArmModel, arms: int = 1) -> Project:
-    """The project in which some arms of a kind place all parts but the first, by turns. Raises
-    InputError (NoCell) for a mix, and where an arm would have nothing to do."""
+def armed(project: Project, model: ArmModel, arms: Sequence[CellArm] = (CellArm(),)) -> Project:
+    """The project in which some arms of a kind place all parts but the first. Raises InputError
+    (NoCell) for a mix, and where an arm would have nothing to do."""
     if project.pag.mix is not None:
         message = f"a cell makes one product, not a mix: {project.pag.title}"
         raise InputError(Diagnostic("NoCell", message, None, RAILS))
     made = _lowering(project, model)
-    crew = tuple(_crew(made.compiled, model.kind, arms))
+    crew = tuple(dealt(made.compiled, model.kind, arms))
     return made.with_plan(Plan(turns=(crew,), lifts=frozenset()))
 
 
@@ -204,34 +203,6 @@ def _not_lowered(project: Project) -> list[tuple[str, str]]:
         if len(node.inputs) > 1 and approach and approach.lowered != node.inputs[-1]:
             stuck.append((node.label.partition("/")[0], node.inputs[-1].partition("/")[0]))
     return stuck
-
-
-def _crew(factory: Factory, kind: str, arms: int) -> Iterator[int]:
-    """The robot (index) that does the tour of each robot of a factory: carriers and tools their
-    own, arms in equal shares, by turns, what is placed; the first all that has to do with
-    sub-assemblies, which are built where it stands. Raises InputError (NoCell) where nothing is
-    left for one."""
-    others = [robot.index for robot in factory.robots if robot.type != kind]
-    placing = [robot for robot in factory.robots if robot.type == kind]
-    order = sorted(placing, key=lambda robot: factory.postorder[robot.operations[-1]])
-    ends = [[factory.operations[n] for n in robot.operations] for robot in order]
-    first = [bool(takes.inputs or joins.carrier) for takes, *_, joins in ends]
-    shares, last, turn = [sum(first), *[0] * (arms - 1)], -1, dict[int, int]()
-    for robot, is_first in zip(order, first, strict=True):
-        if not is_first:
-            last = min(range(arms), key=lambda arm: (shares[arm], arm == last))
-            shares[last] += 1
-        turn[robot.index] = last = 0 if is_first else last
-    if not all(shares):
-        message = (
-            f"{arms} arms: all that is placed has to do with sub-assemblies, which one arm does"
-        )
-        raise InputError(Diagnostic("NoCell", message, None, f"one arm: --arm {kind}; {RAILS}"))
-    for robot in factory.robots:
-        if robot.index in turn:
-            yield len(others) + turn[robot.index]
-        else:
-            yield others.index(robot.index)
 
 
 def _piles_first(pag: PAG, label: str) -> tuple[str, ...]:

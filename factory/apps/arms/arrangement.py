@@ -11,10 +11,10 @@ from math import asin, copysign, cos, pi, sin, sqrt
 import numpy as np
 
 from factory.api import Array, Diagnostic, Operation, Point2, RunError, Solid
-from factory.apps.arms.arming import RAILS
 from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.crew import RAILS
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal, wrist
 from factory.apps.arms.reach import Ring, ring_of

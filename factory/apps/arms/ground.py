@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
-from factory.api import Factory, Ground, Layout, Product, Project, Settings, usage_error
+from factory.api import (
+    Factory,
+    Ground,
+    InputError,
+    Layout,
+    Position,
+    Product,
+    Project,
+    Settings,
+)
 from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
+from factory.apps.arms.crew import CellArm, arms_in, asked_arms
 from factory.apps.arms.joint_way import WayLimits
-from factory.apps.arms.model import ArmModel
+from factory.apps.arms.model import KINDS, ArmModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,20 +30,24 @@ class CellGround(Ground):
 
     Attributes:
         model: the kind of its arms.
-        arms: how many there are.
+        arms: the arms.
         source: the project of the product as it was given.
         rails: by label of what carriers bring, its project on rails, from which the carrier's line
             is taken; the first is that of the product.
     """
 
     model: ArmModel | None = field(default=None, compare=False, repr=False)
-    arms: int = field(default=1, compare=False, repr=False)
+    arms: tuple[CellArm, ...] = field(default=(), compare=False, repr=False)
     source: Project | None = field(default=None, compare=False, repr=False)
     rails: Mapping[str, Project] = field(default_factory=dict, compare=False, repr=False)
 
     @property
     def machines(self) -> str:
         return "pads, feeders and the tray"
+
+    @property
+    def is_named(self) -> bool:
+        return self.model is None or self.model.kind in KINDS
 
     @property
     def reach_bound(self) -> bool:
@@ -78,15 +93,28 @@ def with_arm(project: Project, asked: str) -> Project:
 
     Raises InputError: Usage for an unknown kind, BadArm, NoCell for what a cell cannot make.
     """
-    name, _, number = asked.partition("=")
-    if number not in ("", "1", "2"):
-        raise usage_error(f"--arm {asked}: a cell has one arm or two", f"--arm {name}=2")
-    return cell_of(project, ArmModel.of(name), int(number or 1))
+    return cell_of(project, *asked_arms(asked))
 
 
-def cell_of(project: Project, model: ArmModel, arms: int) -> CellProject:
-    """The project in which so many arms of a kind place all parts but the first. Raises InputError
-    (NoCell) for what a cell cannot make."""
+def with_arms(project: Project, table: Mapping[str, Mapping[str, Any]], at: Position) -> Project:
+    """The project in which the arms of a table do so.
+
+    Args:
+        project: of the product.
+        table: what is said of each arm, by its name.
+        at: where the table is; the files of arms are named from there.
+
+    Raises InputError: BadValue for a table that is not valid, BadArm, NoCell.
+    """
+    try:
+        return cell_of(project, *arms_in(table, Path(at.file).parent))
+    except InputError as error:
+        raise InputError(replace(d, position=d.position or at) for d in error.diagnostics) from None
+
+
+def cell_of(project: Project, model: ArmModel, arms: tuple[CellArm, ...]) -> CellProject:
+    """The project in which arms of a kind place all parts but the first. Raises InputError (NoCell)
+    for what a cell cannot make."""
     made = armed(project, model, arms)
     piles = made.pag.root, *piles_of(made.pag)
     rails = {pile: on_rails(project, made.pag, pile) for pile in piles}

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.api import Array, Diagnostic, RunError
-from factory.apps.arms.arming import RAILS
 from factory.apps.arms.burdens import Burden
 from factory.apps.arms.cell import ToolGrip
 from factory.apps.arms.chain import SerialChain, cross
+from factory.apps.arms.crew import RAILS
 from factory.apps.arms.dynamics import GRAVITY, torque_share
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.floor.layout.hands.tips import STRONG, tip

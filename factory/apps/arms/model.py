@@ -7,7 +7,7 @@ includes is in it, and its defaults are where they are.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -18,7 +18,7 @@ import numpy as np
 
 from factory.api import Diagnostic, InputError, Position, mujoco, usage_error
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.read import MODELS, chain_of
+from factory.apps.arms.read import MODELS, chain_of, read_chain
 
 KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
 """The arms that are shipped."""
@@ -58,7 +58,7 @@ class ArmModel:
         if file.suffix != ".xml" or not file.is_file():
             hint = f"arms: {', '.join(KINDS)}; or the path of an MJCF file"
             raise usage_error(f"there is no arm '{asked}'", hint)
-        return _own(file)
+        return own_arm(file)
 
     def root(self) -> Element:
         """The MJCF."""
@@ -70,8 +70,16 @@ class ArmModel:
         return mujoco.MjModel.from_xml_string(text, dict(self.files))
 
 
-def _own(file: Path) -> ArmModel:
-    """The arm of a user's file."""
+def own_arm(
+    file: Path, tool: str = "tool", values: Mapping[str, Sequence[float]] | None = None
+) -> ArmModel:
+    """The arm of a user's file. Raises InputError (BadArm).
+
+    Args:
+        file: its MJCF.
+        tool: name of the site at its flange.
+        values: `speed` and `acceleration` of its joints, in place of those in the file.
+    """
     kind = re.sub(r"\W", "_", file.stem, flags=re.ASCII)
     kind = kind if kind[:1].isalpha() and kind not in KINDS else f"arm_{kind}"
     try:
@@ -83,6 +91,8 @@ def _own(file: Path) -> ArmModel:
         raise InputError(
             Diagnostic("BadArm", message, Position(str(file), 1, 1), "valid MJCF")
         ) from error
+    if tool != "tool" and tool not in [site.get("name") for site in root.iter("site")]:
+        read_chain(file, tool)  # which says so
     files = dict[str, bytes]()
     compiler = root.find("compiler")
     folder = file.parent / (compiler.get("meshdir", "") if compiler is not None else "")
@@ -96,10 +106,26 @@ def _own(file: Path) -> ArmModel:
             mesh.attrib.pop("content_type", None)
     for numeric in root.findall("custom/numeric"):
         numeric.attrib.pop("size", None)
+    for name, row in (values or {}).items():
+        said = root.find(f"custom/numeric[@name='{name}']")
+        if said is None:
+            custom = root.find("custom")
+            custom = ElementTree.SubElement(root, "custom") if custom is None else custom
+            said = ElementTree.SubElement(custom, "numeric", name=name)
+        said.set("data", " ".join(map(repr, row)))
+    if tool != "tool":
+        _call_tool(root, tool)
     if compiler is not None:
         for key in ("meshdir", "texturedir", "assetdir"):
             compiler.attrib.pop(key, None)
     return arm_model(kind, file, ElementTree.tostring(root, encoding="unicode"), files)
+
+
+def _call_tool(root: Element, name: str) -> None:
+    """Call the site of a name `tool`, and another site of that name otherwise."""
+    for site in root.iter("site"):
+        if site.get("name") in (name, "tool"):
+            site.set("name", "tool" if site.get("name") == name else "tool/of its file")
 
 
 @lru_cache(maxsize=8)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.api import Array, Diagnostic, Layout, RunError, Solid
-from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement
+from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.turning import presented

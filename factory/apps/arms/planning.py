@@ -11,13 +11,13 @@ from math import pi
 import numpy as np
 
 from factory.api import Array, Diagnostic, Index, Layout, Operation, RunError, mujoco
-from factory.apps.arms.arming import RAILS
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, facing
 from factory.apps.arms.certifying import uncertified
 from factory.apps.arms.chain import ConvexBody
 from factory.apps.arms.circuit import candidates, circuit, free_candidates
+from factory.apps.arms.crew import RAILS
 from factory.apps.arms.holds import facing_up
 from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits

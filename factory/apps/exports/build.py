@@ -18,6 +18,7 @@ from factory.api import (
     write_all,
 )
 from factory.apps.drawing.tables import titled
+from factory.apps.exports import arm_program, joints
 from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.exports.dot import write_dot
@@ -26,6 +27,7 @@ from factory.apps.exports.goals import goals
 from factory.apps.exports.pnml import write_pnml
 from factory.apps.exports.program_text import write_program
 from factory.apps.exports.stock import model_files, written
+from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
 from factory.floor.layout.exclusions import coordinated
@@ -67,6 +69,9 @@ DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
 }
 """Everything about a factory but the model: by the endings of their files, what writes the text."""
 
+OF_RAILS = "goals.json", "ways.json"
+"""What is about guidepaths."""
+
 
 @dataclass(frozen=True, slots=True)
 class BuildRequest:
@@ -81,12 +86,6 @@ class BuildRequest:
     def model_path(self, name: str) -> Path | None:
         """Where the model of a product of this `name` is written; None where it is not."""
         return self.mjcf or (self.output and self.output / f"{name}.xml")
-
-    def check(self, project: Project) -> None:
-        """Check that a project can be written, before it is laid out. Raises InputError (Usage)
-        where a folder is asked for of robots without guidepaths."""
-        if self.output is not None:
-            project.compiled.check_rails("-o DIR")
 
     def claim(self, name: str) -> None:
         """Declare the files that a build of this `name` writes, except meshes, before it begins.
@@ -132,7 +131,6 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     its goal in it, where the engine refuses the model, and where a file whose name is chosen here
     would be written through a link, or over what was read. Nothing is written then."""
     request.claim(project.name)
-    request.check(project)
     layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
     clearance = layout.certificate or certify(layout)
@@ -148,14 +146,27 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
         own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf})
     if output is not None:
         what = _Drawn(project, clearance, verdict, model)
-        texts = {f"{project.name}.{end}": write(what) for end, write in DOCUMENTS.items()}
-        documents = {output / name: text.encode() for name, text in texts.items()}
+        documents = {output / name: content for name, content in _documents(what).items()}
         documents |= plan_files(project, output)
         own_names(output, documents)
         files |= documents
     write_all(files | binary)
     named = (*files, path, seal_of(path)) if path else tuple(files)
     return Built(model, clearance, mjcf, named)
+
+
+def _documents(what: _Drawn) -> dict[str, bytes]:
+    """The documents of a build by name: of a cell also the joints and programs of its arms, and
+    none that is about guidepaths."""
+    name, is_cell = what.project.name, what.project.layout.chains is not None
+    ends = (end for end in DOCUMENTS if not (is_cell and end in OF_RAILS))
+    made = {f"{name}.{end}": DOCUMENTS[end](what).encode() for end in ends}
+    if is_cell:
+        for export in (joints.export, arm_program.export):
+            of_arms = export(Subject(Path(f"{name}.pag"), what.project, whole=True))
+            assert isinstance(of_arms, Mapping)
+            made |= of_arms
+    return made
 
 
 def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from factory.api import Project, usage_error
+from factory.apps.arms.crew import CellArm
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,12 +19,14 @@ class CellTable:
     Attributes:
         kind: their name, as a robot type.
         arms: how many there are.
+        crew: what each is to place, where that is said.
         text: the MJCF of an arm of a user; empty for one that is shipped.
         files: its meshes by name, in Base64.
     """
 
     kind: str
     arms: int
+    crew: tuple[CellArm, ...] = ()
     text: str = field(default="", repr=False)
     files: Mapping[str, str] = field(default_factory=dict, repr=False)
 
@@ -32,6 +35,8 @@ class CellTable:
             raise ValueError(f"kind must be the name of a robot type, not {self.kind!r:.40}")
         if self.arms not in (1, 2):
             raise ValueError(f"arms must be 1 or 2, not {self.arms}")
+        if self.crew and len(self.crew) != self.arms:
+            raise ValueError(f"crew must be a list of {self.arms}, not of {len(self.crew)}")
 
     def project(self, product: Project) -> Project:
         """The project of the cell.
@@ -45,13 +50,14 @@ class CellTable:
         from factory.apps.arms.model import KINDS, ArmModel, arm_model
         from factory.apps.log.admission import admitted
 
+        arms = self.crew or (CellArm(),) * self.arms
         if self.text:
             files = {name: b64decode(each, validate=True) for name, each in self.files.items()}
             text = admitted(self.text, files)
-            return cell_of(product, arm_model(self.kind, Path(self.kind), text, files), self.arms)
+            return cell_of(product, arm_model(self.kind, Path(self.kind), text, files), arms)
         if self.kind not in KINDS:
             raise ValueError(f"kind must be one of {', '.join(KINDS)}, not {self.kind!r:.40}")
-        return cell_of(product, ArmModel.of(self.kind), self.arms)
+        return cell_of(product, ArmModel.of(self.kind), arms)
 
 
 def cell_in(project: Project) -> tuple[Project, CellTable] | None:
@@ -70,12 +76,13 @@ def cell_in(project: Project) -> tuple[Project, CellTable] | None:
     if not isinstance(ground, CellGround) or ground.model is None or ground.source is None:
         return None
     model = ground.model
+    crew = ground.arms if any(arm.labels for arm in ground.arms) else ()
     if model.kind in KINDS:
-        return ground.source, CellTable(model.kind, ground.arms)
+        return ground.source, CellTable(model.kind, len(ground.arms), crew)
     try:
         admitted(model.text, model.files)
     except ValueError as error:
         message = f"no log can be kept with the arm of {model.file}: {error}"
         raise usage_error(message, "leave that out of its file, or leave out --log") from error
     files = {name: b64encode(content).decode() for name, content in model.files.items()}
-    return ground.source, CellTable(model.kind, ground.arms, model.text, files)
+    return ground.source, CellTable(model.kind, len(ground.arms), crew, model.text, files)

@@ -26,6 +26,7 @@ from factory.api import (
     table_of,
     value_of,
 )
+from factory.apps.log.cell_table import cell_in
 from factory.apps.log.project_table import ProjectTable, project_of, project_table
 from factory.floor.layout.saved import LAID_FOR, LayoutTable
 from factory.support.files import MESH
@@ -56,6 +57,8 @@ class PlanFile:
         this plan and for these; `warn` is told where it is not. Raises InputError."""
         with _of_a_plan(self.path):
             made = project_of(self.table, self.path.parent, settings, ground)
+        if "cell" in self.table:
+            return made
         with _fitting(self.path):
             made.plain  # noqa: B018 (compiled once)
         path = self.path.parent / LAYOUT_NAME
@@ -95,11 +98,15 @@ def plan_files(
     project: Project, folder: Path, text: str | None = None, laid: bool = True
 ) -> dict[Path, bytes]:
     """The two files of a project, for a folder, without the layout where it is not to be `laid`
-    out; `text`: that of its PAG where its meshes are moved beside the folder. Raises InputError
-    (Usage) for robots without guidepaths, OSError where a mesh cannot be read."""
-    project.compiled.check_rails("a plan (-o DIR)")
+    out, and of a cell, whose plan is its product with its arms; `text`: that of its PAG where its
+    meshes are moved beside the folder. Raises OSError where a mesh cannot be read, InputError
+    (Usage) for an arm that could not be read again."""
+    if (cell := cell_in(project)) is not None:
+        project, laid = cell[0], False
     pag, factory = project.pag, project.layout.factory if laid else project.plain
     table = project_table(pag, project.templates, factory, project.settings, text)
+    if cell is not None:
+        table["cell"] = table_of(cell[1])
     if text is not None:
         table["pag"]["file"] = f"{project.name}.pag"
     elif not pag.file.startswith("<"):

@@ -179,6 +179,7 @@ def revised(old: Project, new: Project, pin: Pin = "all") -> Revision:
     RunError (Layout) where there is no layout even afresh."""
     for made in (old, new):
         made.pag.check_alone("revise")
+        made.compiled.check_rails("revise")
         if not (made.plan.is_as_written and made.ground == Ground(made.ground.floor)):
             hint = "give the PAG: `revise` compiles it with a robot for each tour"
             raise usage_error(f"'{made.file}' has shared robots", hint)

@@ -31,12 +31,17 @@ APART = (
         "robots that run their own programs do not recover",
     ),
     ("--platen", ("--relay", "--cycle"), "relays need straight guidepaths"),
-    (
-        "--arm",
-        ("--relay", "--cycle", "--robots", "--parallel", "--platen", "[lines]", "[tees]"),
-        "a cell has one carrier and its arms",
+    *(
+        (arms, options, reason)
+        for arms in ("--arm", "[arms]")
+        for options, reason in (
+            (
+                ("--relay", "--cycle", "--robots", "--parallel", "--platen", "[lines]", "[tees]"),
+                "a cell has one carrier and its arms",
+            ),
+            (("--floor",), "a cell is as large as its arm"),
+        )
     ),
-    ("--arm", ("--floor",), "a cell is as large as its arm"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""

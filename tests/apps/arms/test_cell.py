@@ -13,6 +13,7 @@ from factory.api import Diagnostic, RunError
 from factory.apps.arms import planning
 from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
+from factory.apps.arms.crew import CellArm
 from factory.apps.arms.legs import NoWay
 from factory.apps.arms.model import ArmModel
 from factory.apps.live.interventions import Interventions
@@ -204,7 +205,7 @@ def test_three_arms_have_no_room() -> None:
     text += "; knob = atomic ( cylinder = (0.008, 0.012), pos = (0, 0, 0.0665) )"
     templates = all_templates()
     rails = Project(read_pag(text, templates), templates)
-    factory = armed(rails, ArmModel.of("six"), 3).compiled
+    factory = armed(rails, ArmModel.of("six"), (CellArm(),) * 3).compiled
     place = Arrangement(
         factory, rails.product, {0: rails.layout}, 0, ArmModel.of("six").chain, 0.0, 0.41
     )
