@@ -56,13 +56,17 @@ def build(
     The PAG is compiled, verified and laid out first.
     """
     from factory.support.cache import build_name, find_build, keep_build
+    from factory.support.user_defaults import defaults_for
 
     begin = perf_counter()
     writable(mjcf)
     writable_folder(output)
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
+    kept_values = defaults_for(options.file).values
     settings = options.settings()
-    name = build_name(options.file, {**asdict(options), **wanted, "settings": settings})
+    name = build_name(
+        options.file, {**asdict(options), **wanted, "settings": settings, "kept": kept_values}
+    )
     kept = find_build(name)
     is_current = kept is not None
     if kept is None:
@@ -76,7 +80,6 @@ def build(
             request.claim(options.file.stem)
         project = options.project(out.silent)
         request.claim(project.name)
-        request.check(project)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
@@ -85,7 +88,8 @@ def build(
             built = build_files(project, verdict, request)
         kept = _printed(project, built, spent, wip)
         inputs = (*project.pag.files, *plan, *_shipped_and_own(options.folders))
-        keep_build(name, inputs, built.files, kept)
+        if project.ground.is_named:
+            keep_build(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
     for text in [] if out.silent else kept["all warnings" if out.verbose else "warnings"]:

@@ -65,6 +65,16 @@ def test_a_file_that_is_not_as_it_was_is_built_again(run: Terminal, out: Path, w
     assert again(lines(run, PAPER, "--mjcf", mjcf))
 
 
+def test_another_factory_toml_is_another_build(run: Terminal, product: Path) -> None:
+    """Whatever it says: branches, lines, arms."""
+    mjcf = product.parent / "m.xml"
+    lines(run, product, "--mjcf", mjcf)
+    (product.parent / "factory.toml").write_text("[parallel]\nb = 2\n")
+    assert not again(lines(run, product, "--mjcf", mjcf))
+    (product.parent / "factory.toml").unlink()
+    assert not again(lines(run, product, "--mjcf", mjcf))
+
+
 def test_other_settings_are_another_build(run: Terminal, out: Path) -> None:
     lines(run, PAPER, "-o", out / "x")
     for words in (["--floor", "9x9"], ["--units", "2"], ["--wip", "1"], ["--force", "4"]):

@@ -68,6 +68,11 @@ class Ground:
         return False
 
     @property
+    def is_named(self) -> bool:
+        """Whether all that it depends on is named by options, and no file but the product's."""
+        return True
+
+    @property
     def relays(self) -> bool:
         """Whether relays are asked for: a cycle time asks for them too."""
         return self.relay or self.cycle is not None
