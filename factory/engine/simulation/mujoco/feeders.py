@@ -101,6 +101,8 @@ class Feeders:
         while True:
             number = line[0] if len(line) == 1 else self._turn(line, self.supply.rounds())
             label = self._stations[number].label
+            if not self.supply.word.demand:
+                return number
             if not self.supply.skips(label):
                 return number if self.supply.is_known(label) else None
 
@@ -165,7 +167,8 @@ class Feeders:
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
-        idle = [number for number in self._vacant() if not self._is_busy(number)]
+        busy = self._busy()
+        idle = [n for n in self._vacant() if self._stations[n].code not in busy]
         is_clear = self._passing.clear() if idle else ()
         free = [number for number in idle if is_clear[number]]
         waiting = [number for number in idle if not is_clear[number]]
@@ -261,11 +264,11 @@ class Feeders:
             self.back.numbers.remove(number)
         self._welds.write()
 
-    def _is_busy(self, number: int) -> bool:
-        """Whether a slider in a feeder's line moves, or the feeder must present nothing yet."""
-        ends, line = self._sliders.ends, self._lines[self._stations[number].code]
-        awaited = self.back.awaited
-        return any(ends[n] < NEVER or self._stations[n].label in awaited for n in line)
+    def _busy(self) -> set[int]:
+        """The codes of lines in which a slider moves, or which must present nothing yet."""
+        (moving,) = (self._sliders.ends < NEVER).nonzero()
+        waiting = [self._number[label] for label in self.back.awaited if self.serves(label)]
+        return {self._stations[n].code for n in (*moving.tolist(), *waiting)}
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)

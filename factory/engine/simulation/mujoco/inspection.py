@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import comb, degrees
+from math import comb, degrees, sqrt
 
 import numpy as np
 
@@ -66,7 +66,9 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self.soundness = m, d, model, soundness
         self._masks = soundness.masks
-        self._products = product_errors(model)
+        self._products, self._body = product_errors(model), m.geom_bodyid.tolist()
+        self._wrench = np.zeros(6)
+        self._push = self._wrench[:3]
         self.pressing = Pressing(m, model, self._masks)
         self.onsets = Onsets(lambda geom: str(m.geom(geom).name))
         self.joining: dict[int, int] = {}
@@ -92,21 +94,21 @@ class Inspection:
     def contacts(self) -> None:
         """Record the forces between inputs that are being joined, and count the onsets of all other
         contacts except between pads and their payloads."""
-        pairs = self._d.contact
-        now = set()
-        for number in np.flatnonzero(pairs.dist[: self._d.ncon] < 0).tolist():
-            a, b = pairs.geom[number].tolist()
+        pairs, now = self._d.contact, set[tuple[int, int]]()
+        apart = pairs.dist
+        touching = np.flatnonzero(apart[: self._d.ncon] < 0)
+        for number, (a, b) in zip(touching.tolist(), pairs.geom[touching].tolist(), strict=True):
             label = self._joined(a, b)
             if label is not None:
                 self._press(label, number)
                 self.pressing.knocked(a, b)
-            elif not self.pressing.meant(a, b, float(pairs.dist[number])):
+            elif not self.pressing.meant(a, b, float(apart[number])):
                 now.add((a, b))
         self.onsets.note(now, float(self._d.time))
 
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that joins the parts of two geoms; "" for none."""
-        a, b = self._m.geom_bodyid[[one, other]].tolist()
+        a, b = self._body[one], self._body[other]
         unit, code = self._masks.unit, self._masks.code
         if unit[a] < 0 or unit[a] != unit[b]:
             return None
@@ -117,9 +119,8 @@ class Inspection:
         return None
 
     def _press(self, label: str, contact: int) -> None:
-        wrench = np.zeros(6)
-        mujoco.mj_contactForce(self._m, self._d, contact, wrench)
-        force = float(np.linalg.norm(wrench[:3]))
+        mujoco.mj_contactForce(self._m, self._d, contact, self._wrench)
+        force = sqrt(self._push.dot(self._push))
         self.force[label] = max(self.force.get(label, 0.0), force)
 
     def measure(self, unit: int, bodies: np.ndarray, misfit: Misfit) -> None:
