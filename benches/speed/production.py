@@ -49,7 +49,7 @@ CASES: Sequence[tuple[Case, float | None]] = tuple(
 LEAST = 10.0
 """Simulated at least [s] in steady production, and at least one cycle."""
 
-RUNS = 5
+RUNS = 3
 """Processes a case: other load on the machine shows in single ones."""
 
 MEMORY = 1500.0
