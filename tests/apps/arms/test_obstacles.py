@@ -1,0 +1,53 @@
+"""What is in an arm's way is what stands in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.api import Array, RunRequest, Simulation, mujoco
+from factory.apps.arms import planning
+from factory.apps.arms.scene import StandingBox
+from factory.engine.mjcf import names
+from tests.arm_cells import project
+
+TALL = """root = x;
+x = mate ( a, b );
+a = atomic ( box = (0.03, 0.04, 0.1), pos = (0, 0, 0.05) );
+b = atomic ( box = (0.03, 0.03, 0.03), pos = (0, 0, 0.1152) )"""
+
+
+def test_all_that_stands_is_in_an_arms_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The uprights of the outfeed's shed, too, with its shutter up, which are twice as tall as a
+    product."""
+    boxes, obstacles = list[StandingBox](), planning.obstacles
+
+    def seen(*of: Any) -> Iterator[StandingBox]:
+        boxes[:] = obstacles(*of)
+        return iter(boxes)
+
+    monkeypatch.setattr(planning, "obstacles", seen)
+    world = Simulation(project(TALL, "six").layout, RunRequest(units=1)).physical
+    m, d, stands = world.m, world.d, 0
+    mujoco.mj_forward(m, d)
+    for geom in range(m.ngeom):
+        body = m.body(int(m.geom_bodyid[geom])).name
+        if body in ("outfeed", names.SHUTTER) or (body.startswith("feeder") and "/" not in body):
+            stands += 1
+            low, high = extent(m, d, geom)
+            assert any(
+                (low >= np.subtract(box.low, 1e-6)).all() and (high <= np.add(box.high, 1e-6)).all()
+                for box in boxes
+            ), f"{m.geom(geom).name} from {low.round(4)} to {high.round(4)}"
+    assert stands > 8
+
+
+def extent(m: mujoco.MjModel, d: mujoco.MjData, geom: int) -> tuple[Array, Array]:
+    """The box of a geom in the world."""
+    middle, half = m.geom_aabb[geom, :3], m.geom_aabb[geom, 3:]
+    turn = d.geom_xmat[geom].reshape(3, 3)
+    at, reach = d.geom_xpos[geom] + turn @ middle, np.abs(turn) @ half
+    return at - reach, at + reach
