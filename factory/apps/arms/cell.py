@@ -21,7 +21,7 @@ from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.apps.arms.holds import UP, facing_up, product_of, quaternion
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
-from factory.floor.layout.guidepath import Feeder
+from factory.floor.layout.guidepath import Feeder, Point2
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""
@@ -158,6 +158,10 @@ class CellChains:
         if not grip.normal[2]:
             turn = product_of(turn, quaternion(facing_up(grip.normal)))
         return (x, y, z + STEM, *turn.tolist())
+
+    def heading(self, label: str) -> Point2:
+        x, y, _ = (-self.grips[label].normal + 0.0).tolist()
+        return x, y
 
     def hand(self, label: str) -> Hand:
         grip = self.grips[label]

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 from xml.etree.ElementTree import Element
 
-from factory.floor.layout.guidepath import Feeder
+from factory.floor.layout.guidepath import Feeder, Point2
 from factory.floor.layout.hands.hand import Hand
 from factory.support.arrays import Array, Index
 
@@ -102,6 +102,10 @@ class Chains(Protocol):
     def grip(self, robot: int, label: str, centre: Array) -> tuple[float, ...]:
         """The pose (7,) of a part with this centre of mass (3,), in the product, in the body that
         holds it: its place [m] and a quaternion."""
+
+    def heading(self, label: str) -> Point2:
+        """The direction, in the frame of the product, in which a tool that lies level faces what it
+        holds."""
 
     def hand(self, label: str) -> Hand:
         """The tool that holds a part (label), with its pad where it is on the part."""

@@ -107,7 +107,7 @@ class Strength:
             return []
         worst = int(use.argmax())
         if self.dropped is None:
-            self.dropped = self._drop(worst, self._use(worst, share, grips))
+            self.dropped = self._drop(worst, self._use(worst, share, grips), grips)
         weak = np.append(use > 1.0, False)[self._hand[grips]]
         return [self._grips[grip][1] for grip in grips[weak].tolist()]
 
@@ -154,7 +154,10 @@ class Strength:
                 at[2] += grip.visit.height
                 at[2] -= grip.layout.visits[first, grip.robot].height
             load[3:, :3] = np.cross(at, np.eye(3)).T
-            terms[number] = gauge(hand, layout.guidepaths[grip.robot].heading, tour) @ load
+            heading = layout.guidepaths[grip.robot].heading
+            if layout.chains is not None and self._turns[number]:
+                heading = layout.chains.heading(grip.label)
+            terms[number] = gauge(hand, heading, tour) @ load
         return terms
 
     def _use(self, number: int, share: float, grips: Index) -> StrengthUse:
@@ -168,10 +171,11 @@ class Strength:
         whole = (label for label in made if parts == {*factory.contents.get(label, ())})
         return StrengthUse(share, robot.name, next(whole, bodies[0]))
 
-    def _drop(self, number: int, use: StrengthUse) -> Drop:
+    def _drop(self, number: int, use: StrengthUse, grips: Index) -> Drop:
         """The diagnostic of the n-th hand, which lets go."""
         factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
-        bears = _told(next(hand for (one, _), hand in self._hands.items() if one == robot))
+        held = next(grip for grip in grips.tolist() if self._hand[grip] == number)
+        bears = _told(self._hands[self._grips[held][0]])
         message = (
             f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.4g} times"
             f" what its hand bears ({bears})"

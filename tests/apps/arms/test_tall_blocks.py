@@ -1,4 +1,4 @@
-"""What is in an arm's way is what stands in the model."""
+"""Tall blocks, of which drawn products are made: what is in an arm's way, and what it holds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from factory.api import Array, RunRequest, Simulation, mujoco
 from factory.apps.arms import planning
 from factory.apps.arms.scene import StandingBox
 from factory.engine.mjcf import names
-from tests.arm_cells import project
+from tests.arm_cells import chains, project, run
 
 TALL = """root = x;
 x = mate ( a, b );
@@ -51,3 +51,26 @@ def extent(m: mujoco.MjModel, d: mujoco.MjData, geom: int) -> tuple[Array, Array
     turn = d.geom_xmat[geom].reshape(3, 3)
     at, reach = d.geom_xpos[geom] + turn @ middle, np.abs(turn) @ half
     return at - reach, at + reach
+
+
+ON_A_FACE = """root = s4;
+s1 = mate ( p0, p1 );
+s2 = mate ( p2, p3 );
+s3 = mate ( s1, p4 );
+s4 = mate ( s2, s3 );
+p0 = atomic ( box = (0.02, 0.02, 0.1), pos = (0, 0, 0.05) );
+p1 = atomic ( cylinder = (0.005, 0.02), pos = (-0.001, -0.016, 0.01) );
+p2 = atomic ( box = (0.01, 0.02, 0.03), pos = (-0.003, 0.006, 0.1155) );
+p3 = atomic ( box = (0.02, 0.04, 0.1), pos = (0.0205, 0.014, 0.05) );
+p4 = atomic ( box = (0.02, 0.02, 0.01), pos = (0.003, -0.0145, 0.1055) )"""
+"""s3 is held on its face towards -y, and comes from a side."""
+
+
+def test_what_is_held_on_a_face_hangs_on_that_face() -> None:
+    """In a run, too, where its load was measured as if every face were towards -x: the arm was said
+    to drop it."""
+    layout = project(ON_A_FACE, "six").layout
+    assert chains(layout).heading("s3") == (0.0, 1.0)
+    done = run(layout, units=1)
+    assert done.succeeded and done.physics is not None
+    assert 0.0 < (done.physics.grip_strength_share_max or 0.0) < 1.0
