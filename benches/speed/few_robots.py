@@ -137,10 +137,9 @@ def section(results: dict[str, Any]) -> str:
         [
             "## Few robots",
             "Factories that `--robots` finds, proved live and certified clear, in MuJoCo with"
-            f" jitter {results['jitter']:g} over several seeds ({UNITS} units each; of the rocket"
-            " one, without jitter, which has no cycle). *As written*: the robots with one for each"
-            " label. *Least*: the bound that is proved, tools included. *In hands*: labels that are"
-            " held by a hand.",
+            f" jitter {results['jitter']:g} over several seeds ({UNITS} units each). *As"
+            " written*: the robots with one for each label. *Least*: the bound that is proved,"
+            " tools included. *In hands*: labels that are held by a hand.",
             table(head, rows),
         ]
     )

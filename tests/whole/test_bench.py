@@ -137,5 +137,6 @@ def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.Monke
 @pytest.mark.slow
 @pytest.mark.skipif(not large.BRICKS.is_dir(), reason="the LDraw products are not here")
 def test_the_import_of_a_large_product_is_measured() -> None:
-    (row,) = large.measure(quick=True)["rows"]
+    (found,) = large.measure(quick=True)
+    (row,) = found["rows"]
     assert row["command"] == "import" and row["said"]["parts"] == 1253
