@@ -8,6 +8,9 @@ from dataclasses import replace
 import pytest
 
 from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.certificate import ARM_BODY, Region
+from factory.floor.layout.crowding import Crowding
+from factory.floor.layout.dimensions import ARMS
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.guidepath import hull
@@ -197,3 +200,11 @@ def test_later_guests_of_a_row_follow_one_another() -> None:
     stations = [at[o.index] for o in reversed(inserts)]
     assert stations == sorted(stations) and stations[0] > 0
     assert len(set(stations)) >= 3  # at most two, from either side, at one place
+
+
+def test_a_fault_of_two_regions_says_how_far_they_are_apart_or_in_each_other() -> None:
+    layout = paper_layout()
+    one = Region(1, ARMS, ARM_BODY, (0.0, 1.0, 0.0, 1.0), (0.0, 0.1))
+    for x, said in ((1.003, "are 3.0 mm apart"), (0.998, "overlap by 2.0 mm")):
+        other = replace(one, robot=2, box=(x, 2.0, 0.0, 1.0))
+        assert said in Crowding(layout).fault(one, other).message

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, islice, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +27,7 @@ from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import Best, Expected, Tree, TreeTask, tables
 from factory.apps.planning.growing import Divider, bettered, divided, units_of
 from factory.apps.planning.judging import Judged, Site
+from factory.apps.planning.laying import LaidOut
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.searching import GROWING, Sought, budget_of, trees
 from factory.apps.planning.source import placed
@@ -36,6 +38,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
 from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
+from factory.support.errors import Diagnostic, RunError
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang.pag_reader import read_pag
 
@@ -355,3 +358,15 @@ def test_each_bound_has_an_equal_share_of_the_budget(monkeypatch: pytest.MonkeyP
     trees(asked)
     used.append(asked.budget.used)
     assert np.diff(used) == pytest.approx((GROWING - used[0]) / 3, abs=0.01)
+
+
+def test_a_tree_without_a_layout_takes_for_ever_on_an_endless_floor() -> None:
+    class Unlaid:
+        settings = None
+
+        @property
+        def layout(self) -> None:
+            raise RunError(Diagnostic("NoLayout", "no", None, ""))
+
+    tree: Any = LaidOut(None, (), Unlaid(), 1)  # type: ignore[arg-type]
+    assert tree.seconds == np.inf == tree.area
