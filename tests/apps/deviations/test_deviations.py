@@ -453,3 +453,7 @@ def test_parameters_are_in_their_range() -> None:
     force, seconds = KINDS["push"].parameters
     assert force.admits((0.0, -1.0, 2.0)) and not force.admits((0.0, 1.0))
     assert seconds.admits(0.5) and not seconds.admits(0.0)
+
+
+def test_a_bad_part_is_seen_unless_it_is_hidden() -> None:
+    assert not Deviation("bad_part", label="part1", unit=1).hidden
