@@ -5,7 +5,8 @@ the list, `benches/mutants.toml`. `python -m benches.mutants run [ROOM…] --tes
 change of the rooms to a copy of the project, runs the tests there, and prints which test failed
 first (`--all`: every test that fails); `--write then` and `--write now` keep that in the list.
 A room is a folder, as in `factory/floor/mating`, or a file. Without `--tests` the tests are those
-that the list names for the room."""
+that the list names for the room. A mutant that changes nothing that can be told has the
+reason in the list, `equivalent`, and is not run."""
 
 from __future__ import annotations
 
@@ -151,9 +152,18 @@ def failing(copy: Path, tests: Sequence[str], limit: float, every: bool) -> list
     return names or ([] if done.returncode == 0 else [f"status {done.returncode}"])
 
 
+def wanted_of(mutants: Sequence[Mutant], rooms: Sequence[str]) -> list[Mutant]:
+    """The mutants of some rooms, of all where none is named, that change what can be told."""
+    return [
+        one
+        for one in mutants
+        if "equivalent" not in one and (not rooms or within(one["file"], rooms))
+    ]
+
+
 def run(kept: dict[str, Any], asked: argparse.Namespace) -> None:
     """Each mutant of the rooms in turn, and how many were killed."""
-    wanted = [one for one in kept["mutant"] if not asked.rooms or within(one["file"], asked.rooms)]
+    wanted = wanted_of(kept["mutant"], asked.rooms)
     killed = 0
     with tempfile.TemporaryDirectory() as folder:
         copy = shutil.copytree(ROOT, Path(folder) / "copy", ignore=shutil.ignore_patterns(*LEFT))

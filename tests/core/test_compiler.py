@@ -175,3 +175,14 @@ def test_robots_left_touching_are_outside_the_next_domain() -> None:
         compiled("root = s; s = mate(a, b); a = near(); b = near()", part)
     assert codes(error) == ["NotPrepared"]
     assert "'s'" in str(error.value)
+
+
+def test_who_comes_to_a_join_with_nothing_waits_empty() -> None:
+    made = compiled(PAPER)
+    waits = {
+        (o.label, made.robots[robot].name)
+        for o in made.operations
+        for slot, robot in enumerate(o.robots)
+        if o.awaits_empty(slot)
+    }
+    assert waits == {("sub1", "r3"), ("sub2", "r4"), ("sub3", "r1")}

@@ -328,3 +328,14 @@ def test_planted_obstacle_on_the_goal_is_caught(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(mode_module, "_reach", lambda mode: 1.5 * mode.touch)
     bundle = bundle_of([Mode(*blocked)])
     assert "never arrived" in faults(bundle, np.array([1.0, 1.1, 0.1]), seconds=3.0)
+
+
+def test_who_waits_pulls_at_whom_it_waits_for() -> None:
+    """The slope of phi of three robots, each waiting for the one before, near their goals."""
+    made = chain(np.array([1.0, 0.5, 0.5]))
+    bundle = bundle_of([made])
+    x = made.goals + EPS * np.array([-0.9, 0.95, 40.0])
+    step = 1e-8 * np.eye(3)
+    slope = [(potential(bundle, x + s) - potential(bundle, x - s))[0] / 2e-8 for s in step]
+    assert gradient_of(bundle, x) == pytest.approx(np.array(slope), rel=1e-4, abs=1e-5)
+    assert np.abs(gradient_of(bundle, x)[:2]).min() > 100.0

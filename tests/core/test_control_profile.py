@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.support.arrays import Array
-from factory.theory.control.governed import GovernedAxis, mode_ticks, trajectories
+from factory.theory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
 from factory.theory.control.governor import follow
 from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
@@ -131,3 +131,14 @@ def test_waiting_takes_a_tick_or_its_dwell() -> None:
     ways = trajectories(Mode.still(2), np.zeros(2), limits, drive)
     assert mode_ticks(Mode.still(2), ways, 0.01) == 1
     assert mode_ticks(replace(Mode.still(2), dwell=0.25), ways, 0.01) == 25
+
+
+def test_a_way_is_done_with_a_ramp_at_each_end() -> None:
+    """0.25 s each, at half of 0.5 m/s; with a speed at the start the first one is shorter."""
+    assert SpeedProfile().rest(1.0) == pytest.approx(2 * 0.25 + (1.0 - 2 * 0.0625) / 0.5)
+    assert SpeedProfile().rest(1.0, 0.5) == pytest.approx(0.25 + (1.0 - 0.0625) / 0.5)
+
+
+def test_an_axis_rests_once_it_is_both_near_and_slow() -> None:
+    way = Trajectory((0.3, 0.1, 0.0, 0.0), (0.2, 0.1, 0.0, 0.0), (0.2, 0.2, 0.1, 0.0))
+    assert (way.within(0.05), way.rests(0.05), way.rests(0.05, still=0.5)) == (2, 3, 2)

@@ -4,17 +4,23 @@ the product is turned."""
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
+from itertools import permutations, product
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
+from factory.floor.geometry.overlap import Common, common, swept
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.drawn import DrawnWays
+from factory.floor.mating.meetings import Meeting, Meetings
+from factory.floor.mating.overlaps import Finder
 from factory.floor.mating.paths import CLEAR, TOLERANCE, Depths
 from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import load_pag
@@ -51,6 +57,14 @@ def product_of(folder: Path, sections: int, radius: float = 0.0049, turn: bool =
 
 def ways_of(product: Product) -> DrawnWays:
     return DrawnWays(bodies(product, [*product.solids]))
+
+
+def finder_of(made: Product) -> Finder:
+    """Of parts that all come together at once."""
+    labels = tuple(made.solids)
+    every = Meeting("", (), 0, 0, 0, len(labels), either=True)
+    met = Meetings(labels, (every,), np.zeros(len(labels) - 1, np.int64), np.zeros(1, np.int64))
+    return Finder(bodies(made, labels), met, as_drawn=True)
 
 
 def found(ways: DrawnWays, moving: int, standing: int, axis: int, still: bool = False) -> Depths:
@@ -108,3 +122,85 @@ def test_what_was_measured_of_a_product_holds_for_it_turned(tmp_path: Path) -> N
         one, other = found(known, *case), found(anew, *case)
         assert (one.faulty == other.faulty).all(), case
         assert one.path == pytest.approx(other.path, rel=0.05, abs=1e-6), case
+
+
+class Stubbed(DrawnWays):
+    """Ways of bodies (manifolds), by number, of which nothing is measured beforehand."""
+
+    def __init__(self, *drawn_bodies: Any, margin: float = 0.0) -> None:
+        self._bodies, self._off = drawn_bodies, margin
+
+    _beyond = 0.1  # type: ignore[assignment]
+
+    def _body(self, part: int) -> Any:
+        return self._bodies[part]
+
+    def _coarse(self, part: int) -> Any:
+        return SimpleNamespace(body=self._bodies[part], far=0.0)
+
+    def _swept(self, part: int, axis: int, sign: int) -> Any:
+        return swept(self._bodies[part], sign * self._beyond * np.eye(3)[axis])
+
+    def _margin(self, one: int, other: int) -> float:
+        return self._off
+
+    def finished(self, one: int, other: int) -> Common:
+        return common(self._bodies[one], self._bodies[other])
+
+
+def cube(x: float, *sizes: float) -> Any:
+    """A box about a point on the x axis [mm]."""
+    return Manifold.cube([1e-3 * size for size in sizes], True).translate([1e-3 * x, 0, 0])
+
+
+def test_a_part_meets_with_the_first_wall_that_comes() -> None:
+    """It has come so far that the middle of that wall is there."""
+    walls = cube(11, 2, 40, 40) + cube(31, 2, 40, 40)
+    cut: Any = SimpleNamespace(deepest=np.zeros(3))
+    assert Stubbed(walls)._shift(cut, 0, 0, -1) == pytest.approx(0.011)
+
+
+@pytest.mark.parametrize(("gap", "passes"), [(CLEAR, False), (CLEAR + 2.1e-4, True)])
+def test_decimated_parts_pass_with_room_for_what_they_may_be_off(gap: float, passes: bool) -> None:
+    post, wall = cube(0, 10, 2, 2), cube(0, 10, 2, 2).translate([0, 0.002 + gap, 0])
+    found = Stubbed(post, wall, margin=2e-4)._coarsely(0, 1, 0, 1)
+    assert found == ((0.0, 0.0) if passes else None)
+
+
+def test_a_way_leads_out_of_a_small_product(tmp_path: Path) -> None:
+    """Two sheets 2.8 mm apart, face to face: the first passes the second on one side."""
+    text = "root = all; all = mate ( a, b ); " + "; ".join(
+        f"{name} = atomic ( box = (0.0001, 0.002, 0.002), pos = ({x}, 0, 0) )"
+        for name, x in (("a", 0.0), ("b", 0.0029))
+    )
+    (tmp_path / "small.pag").write_text(text)
+    ways = ways_of(product_geometry(load_pag(tmp_path / "small.pag", all_templates())))
+    assert found(ways, 0, 1, 0).path == pytest.approx(np.array([[0.0, 5e-5]]))
+
+
+def test_the_keys_of_pairs_ascend_as_pairs_are_sorted(tmp_path: Path) -> None:
+    finder = finder_of(product_of(tmp_path, COARSE))
+    meeting, standing, moving = np.array([*product(range(4), range(3), range(3))]).T
+    assert (np.diff(finder._key_of(meeting, moving, standing)) > 0).all()
+
+
+def test_the_room_of_a_pin_in_a_ring_is_that_of_its_bore(tmp_path: Path) -> None:
+    finder = finder_of(product_of(tmp_path, COARSE, radius=0.0049))
+    moving, standing, room = finder.rooms(2, 1e-3)
+    (row,) = ((moving == PIN) & (standing == RING)).nonzero()[0]
+    assert room[row] == pytest.approx([1e-4, 1e-4], abs=2e-5)
+
+
+def test_what_a_sweep_has_twice_counts_once() -> None:
+    dice, wall = cube(0, 2, 2, 2), cube(0, 2, 40, 40)
+
+    class Twice:
+        def __xor__(self, other: Any) -> Any:
+            return SimpleNamespace(volume=lambda: 2 * dice.volume(), surface_area=dice.surface_area)
+
+        def decompose(self) -> list[Any]:
+            return [dice, dice]
+
+    ways = Stubbed(dice, wall)
+    ways._swept = lambda *_: Twice()  # type: ignore[method-assign]
+    assert not ways._cuts(0, 1, 0, -1)

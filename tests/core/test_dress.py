@@ -155,3 +155,9 @@ def test_what_is_flat_stays_as_it_is() -> None:
     picture = np.full((30, 40, 3), 200, np.uint8)
     picture[:, 20:] -= 5
     assert np.array_equal(smooth(picture), picture)
+
+
+def test_walls_are_not_drawn_where_a_housing_is() -> None:
+    _, seen = models("paper")
+    walls = [n for n in range(seen.ngeom) if seen.geom(n).name.rpartition("/")[2] in WALLS]
+    assert walls and (seen.geom_group[walls] == SHOWN).all()

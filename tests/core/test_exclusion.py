@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.theory.nets import exclusion
-from factory.theory.nets.exclusion import ORDER, excluding, ordered
+from factory.theory.nets.exclusion import ORDER, _Arc, _Paths, excluding, ordered
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from tests.net_values import net_from
@@ -134,3 +134,12 @@ def test_what_can_not_be_asked_is_refused() -> None:
         ordered(net, [0, 1], [])
     with pytest.raises(ValueError, match="marked graph"):
         excluding(net_from([("a c", "b", 1), ("b", "a", 0), ("b", "c", 0)]), [(0, 1)])
+
+
+@pytest.mark.parametrize(("tokens", "is_implied"), [(0, False), (1, True)])
+def test_an_arc_is_implied_by_a_path_with_no_more_tokens(tokens: int, is_implied: bool) -> None:
+    """The path over the place without a token, though another one with a token goes beside it."""
+    ends, marked = ((0, 1), (0, 1), (1, 2), (2, 0)), (0, 1, 1, 1)
+    places = tuple(Place(f"p{n}", (a,), (b,)) for n, (a, b) in enumerate(ends))
+    net = MarkedNet(PetriNet(tuple(map(Transition, "abc")), places), marked)
+    assert _Paths(net).implies(_Arc(0, 2, tokens, 0)) == is_implied

@@ -8,10 +8,15 @@ from dataclasses import replace
 import pytest
 
 from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.certificate import ARM_BODY, Region
+from factory.floor.layout.crowding import Crowding
+from factory.floor.layout.dimensions import ARMS, Clearance
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.footprint import footprint
 from factory.floor.layout.guidepath import hull
 from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.shapes import symmetric_shapes
 from factory.floor.layout.sweeps import piles
 from factory.floor.modes.modes import operation_modes
 from factory.support.errors import InputError, RunError
@@ -197,3 +202,22 @@ def test_later_guests_of_a_row_follow_one_another() -> None:
     stations = [at[o.index] for o in reversed(inserts)]
     assert stations == sorted(stations) and stations[0] > 0
     assert len(set(stations)) >= 3  # at most two, from either side, at one place
+
+
+def test_a_fault_of_two_regions_says_how_far_they_are_apart_or_in_each_other() -> None:
+    layout = paper_layout()
+    one = Region(1, ARMS, ARM_BODY, (0.0, 1.0, 0.0, 1.0), (0.0, 0.1))
+    for x, said in ((1.003, "are 3.0 mm apart"), (0.998, "overlap by 2.0 mm")):
+        other = replace(one, robot=2, box=(x, 2.0, 0.0, 1.0))
+        assert said in Crowding(layout).fault(one, other).message
+
+
+def test_a_floor_has_tiles_only_if_they_are_asked_for() -> None:
+    assert paper_layout().tile == 0.0
+
+
+def test_a_corridor_beside_a_robot_is_left_only_if_it_is_asked_for() -> None:
+    layout = paper_layout()
+    (shape, *_), c = symmetric_shapes(layout.factory, layout.payloads, Clearance()), Clearance()
+    made = [footprint(layout.factory, 0, shape, c, *asked) for asked in ((), (False,), (True,))]
+    assert [one.corridor for one in made] == [False, False, True]

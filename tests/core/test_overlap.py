@@ -12,6 +12,7 @@ from manifold3d import Manifold
 
 from factory.floor.geometry.distances import distances_to
 from factory.floor.geometry.overlap import _deepest, common, drawn, merged, swept
+from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import load_pag
@@ -146,3 +147,11 @@ def test_an_open_mesh_has_no_solid(tmp_path):
     box.update_faces(np.arange(12) > 5)
     text = 'root = ring; ring = atomic ( mesh = "ring.stl", scale = 0.001 )'
     assert bodies_of(tmp_path, text, box) == {"ring": None}
+
+
+def test_an_overlap_that_is_all_facets_is_said_to_be_and_may_be_allowed() -> None:
+    for sagitta, is_facets in ((1e-4, False), (2e-4, True), (3e-4, True)):
+        fault = Overlapping("peg", "hole", 2e-4, sagitta).fault(())
+        assert fault is not None
+        assert ("may be their facets" in fault.message) == is_facets
+        assert (fault.hint or "").endswith(f"peg:hole:{1e3 * sagitta:g}mm") == is_facets

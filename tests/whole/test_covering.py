@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import ast
+import tomllib
+from collections.abc import Iterable
 
 import numpy as np
 
-from benches.covering import COVERED, chosen, listed
+from benches.covering import COVERED, chosen, killers, listed
+from benches.mutants import LIST, wanted_of
 from tests.paths import ROOT
 
 
-def test_what_is_left_out_is_there() -> None:
-    names = {name.split("[")[0] for name in COVERED.read_text(encoding="utf-8").splitlines()}
+def gone(tests: Iterable[str]) -> set[str]:
+    """Those of some tests whose functions are not there."""
+    names = {name.split("[")[0] for name in tests}
     files = {name.split("::")[0] for name in names}
     there = {
         f"{file}::{node.name}"
@@ -19,7 +23,24 @@ def test_what_is_left_out_is_there() -> None:
         for node in ast.parse((ROOT / file).read_text(encoding="utf-8")).body
         if isinstance(node, ast.FunctionDef)
     }
-    assert not names - there, "run `python -m benches.covering choose`, or take them off the list"
+    return names - there
+
+
+def test_what_is_left_out_is_there() -> None:
+    missing = gone(COVERED.read_text(encoding="utf-8").splitlines())
+    assert not missing, "run `python -m benches.covering choose`, or take them off the list"
+
+
+def test_what_killed_a_mutant_is_there() -> None:
+    missing = gone(name for name in killers() if "::" in name)
+    assert not missing, "run `python -m benches.mutants run ROOM --write now`"
+
+
+def test_a_mutant_that_changes_nothing_is_not_run() -> None:
+    mutants = tomllib.loads(LIST.read_text(encoding="utf-8"))["mutant"]
+    equivalent = [one for one in mutants if "equivalent" in one]
+    assert all(one["equivalent"] and not one["now"] for one in equivalent)
+    assert wanted_of(equivalent, []) == [] and wanted_of(mutants, ["factory/floor/mating"])
 
 
 def test_what_takes_most_new_branches_for_its_time_is_chosen() -> None:

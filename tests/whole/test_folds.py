@@ -35,6 +35,8 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
 from factory.engine.timing.timing import Timing
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.bounds import _Bound
 from factory.floor.layout.durations import Pace, cycle_of
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
@@ -708,3 +710,14 @@ def test_the_commands(run: Terminal, tmp_path: Path) -> None:
     assert set(done.codes) == {"BadMarking"}
     start = "r1:sub1, r2:nopart/part3"
     assert run("run", file, "--world", "ideal", "--from", start, "--units", "3").status == 0
+
+
+@pytest.mark.parametrize("ahead", [None, 1.0])
+def test_the_bound_of_two_tours_is_the_sum_of_their_operations(ahead: float | None) -> None:
+    """One that begins with going ahead may do so while it waits in the other tour."""
+    folded = three_robots()
+    pace = Pace(ahead=ahead)
+    bound = _Bound(folded, product_geometry(folded.pag), 0.02, pace)
+    (two,) = (r for r in folded.robots if len(folded.tours[r.index]) == 2)
+    spent = (folded.operations[o].dwell + pace.lost + bound.moving[o] for o in two.operations)
+    assert bound.gear(two.index) == pytest.approx(sum(spent))

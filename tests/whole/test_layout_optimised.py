@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 
 import factory.floor.layout.optimising as optimising
+import factory.floor.layout.packing as packing
 from factory.engine.timing.gain import gain, soonest
 from factory.engine.timing.timed import pace as paced
 from factory.engine.timing.timing import Timing
@@ -22,6 +25,7 @@ from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.optimising import first_feasible
 from factory.floor.layout.outline import Choice, Outline
+from factory.floor.layout.packing import SPAN, Packing
 from factory.floor.layout.request import Ground
 from factory.floor.layout.shapes import Shape
 from factory.floor.layout.skyline import Skyline
@@ -273,3 +277,31 @@ def test_a_factory_is_laid_out_at_the_pace_of_its_settings(stages: Stages) -> No
         for speed in (0.5, 0.05)
     )
     assert slow.guidepaths != usual.guidepaths
+
+
+def test_the_slowest_robot_counts_most() -> None:
+    assert optimising._weights([4.0, 2.0, 0.0]) == [1.0, (1 + 1 / 16) / 2, 0.5]
+
+
+def test_stations_are_looked_at_as_long_as_the_way_there_is_worth_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stops = (0.1, 0.11, 0.1 + 2 * SPAN, 5.0)
+    guest: Any = SimpleNamespace(side=1, outline=None, travel=0.0)
+    way: Any = SimpleNamespace(
+        station=0.0, cost=0.0, beside={1: SimpleNamespace(starts=lambda outline, least: {*stops})}
+    )
+    made = Packing.__new__(Packing)
+    made.robot, made.task = 0, SimpleNamespace(weights=[1.0], pace=PACE)  # type: ignore[assignment]
+    monkeypatch.setattr(Packing, "_back", lambda *_: 0.0)
+    monkeypatch.setattr(Packing, "_next", lambda *_: iter(()))
+    monkeypatch.setattr(
+        Packing,
+        "_added",
+        lambda self, way, stop, station, guests: SimpleNamespace(
+            at=station, cost=PACE.rest(station) + station / PACE.speed
+        ),
+    )
+    monkeypatch.setattr(packing, "_came", lambda beside, guest, station, travel: guest)
+    looked = [one.at for one in made._stations(way, None, [guest], 0.1)]  # type: ignore[arg-type]
+    assert looked == [0.1, 0.11]

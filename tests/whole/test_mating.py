@@ -34,7 +34,7 @@ from factory.pipeline import all_templates
 from factory.support.errors import Diagnostic
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang import read_pag
-from factory.theory.problem.pag import PAG
+from factory.theory.problem.pag import PAG, AllowedOverlap
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.pag_values import factory_of
@@ -730,3 +730,12 @@ def test_random_products_have_nested_levels_and_consistent_exclusions(seed: int)
 def test_matings_of_a_single_part_are_none(templates: Mapping[str, Template]) -> None:
     pag = read_pag("root = a; a = atomic ( sphere = 0.1 )", templates)
     assert matings(expand(pag, templates), product_geometry(pag)).all == ()
+
+
+def test_what_passes_through_each_other_is_noted_where_it_is_allowed() -> None:
+    a, b = hooks()
+    covers = [block((0, 30), (0, 50), z) for z in ((-5, 0), (10, 15))]
+    found = judged(ALONG_Y, a=a + covers, b=b)
+    assert found.notes([]) == found.notes([AllowedOverlap(0.001)]) == []
+    (note,) = found.notes([AllowedOverlap(0.011, ("a", "b"))])
+    assert note.startswith("a pair of parts passes through each other on the way by up to")

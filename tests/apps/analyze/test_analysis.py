@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
+import factory
 from factory.apps.analyze import Change, Timing, analyse
 from factory.apps.analyze.analysing import least_wip
 from factory.apps.analyze.firing import circuits, slacks
@@ -30,6 +31,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.timed import duration, timed
 from factory.floor.layout.layout import Layout
 from factory.floor.modes.modes import robot_limits
+from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
 from factory.theory.control.mode import Limits
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
@@ -428,3 +430,13 @@ def test_logs_that_do_not_fit(run: Terminal, tmp_path: Path) -> None:
     done = run("analyze", other, "--measured", log, "--json")
     assert (done.status, done.codes) == (2, ["BadLog"])
     assert "is the log of another factory" in json.dumps(done.json)
+
+
+def test_a_net_that_is_not_proved_is_not_analysed(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(net: object) -> None:
+        assert net is paper_layout().factory.net
+        raise RunError(Diagnostic("Deadlock", "it stops", None, ""))
+
+    monkeypatch.setattr("factory.theory.nets.verify.proved", refused)
+    with pytest.raises(RunError, match="it stops"):
+        factory.analyze(paper_layout())

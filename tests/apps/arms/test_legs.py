@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise, product
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from factory.api import Array, Index
+from factory.apps.arms import planning
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, free_candidates, partners
 from factory.apps.arms.inverse import (
@@ -18,6 +21,7 @@ from factory.apps.arms.inverse import (
 )
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.legs import CHECKS, NoWay, leg, line, obstruction, transfer
+from factory.apps.arms.planning import ArmPlanner
 from tests.arm_models import PACE, ball, down, nothing, retreat, shipped, straight_line
 
 LEFT, RIGHT = np.array([0.2, 0.38, 0.15]), np.array([0.2, -0.38, 0.15])
@@ -186,3 +190,34 @@ def test_the_circuit_is_the_best_of_all(seed: int) -> None:
 
     best = min(product(*(range(len(pairs)) for pairs in options)), key=cost)
     assert cost(tuple(circuit(options, speed))) == pytest.approx(cost(best), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("label", "held"), [("lid", [True, True, False]), ("", [False, True, False])]
+)
+def test_a_part_counts_until_it_is_over_its_place(
+    label: str, held: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is judged with the arm while the arm takes it up and on the way, at its place no more."""
+    asked = list[Any]()
+    way = JointWay(np.linspace(0.0, 1.0, 5), np.zeros((5, 2)), 0.1, 0.8)
+    planner: Any = ArmPlanner.__new__(ArmPlanner)
+    planner.chain = SimpleNamespace(bodies=[])
+    planner.scene = SimpleNamespace(margins=lambda q, label, need, spared, held: held)
+    burden = SimpleNamespace(onto=0, source=1, join=None, takes=None, comes=(0, 0, 1))
+    planner.cell = SimpleNamespace(burdens=dict.fromkeys(("lid", "tub"), burden))
+    planner.pace, planner._moving = None, frozenset()
+    for name in ("_have", "_carried", "_spared_at", "_spared_under"):
+        monkeypatch.setattr(ArmPlanner, name, lambda *_: set())
+    monkeypatch.setattr(planning, "leg", lambda *_, **__: way)
+
+    def certify(
+        chain: object, way: JointWay, stretch: object, bodies: object, margins: Any
+    ) -> None:
+        asked.append((stretch, margins(q=way.places)))
+
+    monkeypatch.setattr(planning, "uncertified", certify)
+    end = SimpleNamespace(rows=np.zeros((2, 2)), share=0.1)
+    assert planner._leg(end, end, label, "tub", "lid") is way
+    assert [stretch for stretch, _ in asked] == [(0.0, 0.1), (0.1, 0.8), (0.8, 1.0)]
+    assert [counts for _, counts in asked] == held

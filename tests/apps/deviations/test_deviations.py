@@ -18,6 +18,7 @@ from benches.fidelity.products import PAPER, layout
 from factory.apps.deviations import KINDS, Campaign, Deviation, Sensors, deviate
 from factory.apps.deviations.campaign import campaign_of
 from factory.apps.deviations.campaign_file import read_campaign, written
+from factory.apps.deviations.deviation import misfits
 from factory.apps.deviations.effects import EFFECTS
 from factory.apps.recovery import recover
 from factory.engine.simulation.request import RunRequest
@@ -433,3 +434,26 @@ def test_the_campaign_of_disturbances() -> None:
 def test_every_claimed_start_reaches_its_goal() -> None:
     for mode in attraction.measure()["modes"]:
         assert mode["share_reached"] == 1.0, mode
+
+
+@pytest.mark.parametrize(
+    ("values", "keys"),
+    [
+        ({"label": "sub1", "unit": 1}, []),
+        ({"label": "sub1"}, [""]),
+        ({"label": "sub1", "unit": 1, "at": 2.0}, [""]),
+        ({"label": "sub1", "unit": 0}, ["unit"]),
+    ],
+)
+def test_a_failure_is_at_one_time(values: dict[str, object], keys: list[str]) -> None:
+    assert [key for key, _ in misfits("drop", values)] == keys
+
+
+def test_parameters_are_in_their_range() -> None:
+    force, seconds = KINDS["push"].parameters
+    assert force.admits((0.0, -1.0, 2.0)) and not force.admits((0.0, 1.0))
+    assert seconds.admits(0.5) and not seconds.admits(0.0)
+
+
+def test_a_bad_part_is_seen_unless_it_is_hidden() -> None:
+    assert not Deviation("bad_part", label="part1", unit=1).hidden

@@ -506,3 +506,14 @@ def test_what_is_written_is_said(run: Terminal, out: Path) -> None:
     )
     done = run("export", PAPER, "--format", "stl", "-o", out / "all")
     assert done.out == f"stl: {out / 'all'}, {len(files_in(out / 'all'))} files\n"
+
+
+def test_where_an_arc_leaves_the_drawing_its_place_is_named() -> None:
+    net = net_from(PHILOSOPHERS)
+    at, root = swimlanes(net), ElementTree.fromstring(draw_net(net, "x"))
+    back = {
+        place.name
+        for n, place in enumerate(net.net.places)
+        if not net.owners[n] and any(not at.forward(n, event) for event in place.left)
+    }
+    assert back and {e.text for e in root.iter() if e.get("class") == "edge"} == back

@@ -144,3 +144,14 @@ def test_outlines_are_convex_hulls() -> None:
 def test_the_drawing_grows_with_the_number_of_robots() -> None:
     sizes = [len(write_svg(random_layout(n, 1, "balanced", "plain"))) for n in (40, 160)]
     assert sizes[1] < 4.6 * sizes[0]
+
+
+def test_chevrons_point_along_the_belt() -> None:
+    belt = group(drawn(paper_layout()), "outfeed")
+    ways = [p.get("d", "") for p in belt if p.get("class") == "chevron"]
+    assert ways
+    for way in ways:
+        (x, y), (tip, middle), (back, down) = (
+            map(float, corner.split()) for corner in way.removeprefix("M").split("L")
+        )
+        assert x == back < tip and y < middle < down

@@ -17,10 +17,12 @@ import factory
 from factory.apps.few_robots.aim import Aim
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.forms import (
+    APART,
     FormsTask,
     Option,
     _finished,
     _joined,
+    _over,
     best_forms,
     joins,
     written_forms,
@@ -273,3 +275,12 @@ def test_from_python() -> None:
         6,
     ]
     assert factory.compile(pag) == read(EXAMPLES / "paper.pag", settings=Settings()).plain
+
+
+def test_the_cycle_of_who_delivers_has_both_ways_and_a_loss() -> None:
+    pag = table_pag("x", ("x", "mate", "a b", {}), ("a", "atomic", "", {}), ("b", "atomic", "", {}))
+    task = replace(task_of(pag), pace=Pace(lost=0.2))
+    option = Option(0, 0, 0.0, 0, 3.0)
+    cycle = 3.2 + 2 * task.pace.rest(task.size("a") + APART)
+    assert _over(task, "a", option, cycle - 0.5) == pytest.approx(0.5)
+    assert _over(task, "a", option, cycle) == 0.0

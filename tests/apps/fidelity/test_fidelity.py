@@ -13,6 +13,7 @@ from benches.fidelity.convergence import soften
 from factory.apps.analyze.measured import operation_times
 from factory.apps.fidelity import QUANTITIES, SeedRecord, measure, measure_seed
 from factory.apps.fidelity.comparing import Alter, Case
+from factory.apps.fidelity.record import Fidelity
 from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
@@ -177,3 +178,11 @@ def test_what_cannot_be_written_is_refused_before_anything_runs(run: Terminal, o
     assert done.status == 2
     assert done.codes == ["BadFile"]
     assert run("fidelity", PAPER, "--seeds", 0).status == 2
+
+
+@pytest.mark.parametrize(
+    ("units", "words"), [((4, 4), "2 seeds, 4 units"), ((9, 4, 61), "3 seeds, 4 to 61 units")]
+)
+def test_runs_are_counted_from_the_fewest_units_to_the_most(units, words: str) -> None:
+    seeds = tuple(SeedRecord(seed, count, {}) for seed, count in enumerate(units))
+    assert Fidelity("x", 3, 0.3, seeds).runs == words

@@ -23,6 +23,7 @@ from factory.apps.live.interventions import Interventions
 from factory.apps.live.page import page, stage_of
 from factory.apps.monitor import beside
 from factory.apps.report.drawings import floor_plan, labels_of
+from factory.engine.mjcf import names
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -409,3 +410,12 @@ def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.Monkey
 def test_every_key_of_a_command_is_checked() -> None:
     keys = {key for keys in (*KEYS.values(), *FAULTS.values()) for key in keys}
     assert keys == {field.name for field in fields(Command)} - {"do"}
+
+
+def test_the_page_shows_how_far_robots_reach() -> None:
+    simulation = Simulation(paper_layout())
+    layout, reach = simulation.layout, stage_of(simulation).reach
+    for robot in layout.factory.robots:
+        stops = [layout.home(robot.index, o) for o in robot.operations]
+        low, high = reach[:, simulation.physical.m.body(names.carriage(robot.name)).id]
+        assert np.linalg.norm(high - low) == pytest.approx(max(stops) - min(stops))

@@ -20,6 +20,7 @@ from factory.apps.monitor import MonitorSubject, Report, beside
 from factory.apps.monitor.explanation import SeenFirings
 from factory.apps.monitor.motion import AxisMotion
 from factory.apps.monitor.record import watch_log
+from factory.apps.monitor.recount import WORDS, _Places
 from factory.engine.record.state import Observation
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -516,3 +517,19 @@ def test_a_robot_seen_to_leave_first_as_operations_end_has_not_left_before() -> 
     motion.look(seen(0.6, 0.1, False))
     left, _, _ = motion.look(seen(0.7, 0.05, False))
     assert left.tolist() == [0] and motion.begun(0) == 0.7
+
+
+def test_a_part_that_is_turned_in_the_product_shows_in_its_angle() -> None:
+    places = _Places.__new__(_Places)
+    labels, turn = ["a", "b"], np.radians(3.0)
+    places._anatomy = SimpleNamespace(  # type: ignore[assignment]
+        label=labels, copy_of=np.arange(2), body=np.array([0, 7])
+    )
+    places._order, places._reach = {"a": 0, "b": 1}, np.array([0.0, 0.1])
+    places._place = {"a": np.zeros(3), "b": np.array([0.0, 0.0, 0.1])}
+    places.figures, places.most_error = dict.fromkeys(WORDS), 0.0
+    qpos = np.array([0, 0, 0, 1, 0, 0, 0, 0, 0, 0.1, np.cos(turn / 2), 0, 0, np.sin(turn / 2)])
+    places._finished([0, 1], qpos)
+    assert places.figures["product_angle_max_deg"] == pytest.approx(3.0)
+    assert places.figures["product_error_max_mm"] == pytest.approx(0.0)
+    assert places.most_error == pytest.approx(1e3 * turn * 0.1)

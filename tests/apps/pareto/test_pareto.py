@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.apps.few_robots.aim import least_robots
+from factory.apps.few_robots.aim import Least, least_robots
 from factory.apps.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
 from factory.apps.pareto.chart import ChartAxis, cycle_chart
 from factory.apps.pareto.front import Trial, commands_of, point_files, tried, undominated
@@ -373,3 +373,26 @@ def test_a_search_for_few_robots_can_be_stopped(run: Terminal, monkeypatch) -> N
 def test_the_least_number_is_that_of_the_tree(front: ParetoFront) -> None:
     project = read(PAPER)
     assert front.least == least_robots(project.pag, project.templates)
+
+
+def test_a_page_says_how_many_runs_were_as_predicted() -> None:
+    point = FrontPoint(PROJECT, 3, 0, None, 1.0, 1.0, 2.0)
+    front = ParetoFront("x", (point, replace(point, robots=4)), Least(1, 0, (("x", 1),)))
+    assert "Run in both worlds" not in front_page(front, ["x", "x"])
+    tried_ones = front.with_trial(0, Trial(4, 1.0, 1.01, 1.0)).with_trial(
+        1, Trial(4, 1.0, 1.04, 1.0)
+    )
+    card = '<h3>Run in both worlds</h3><p class="value"><span class="bad">1 of 2</span></p>'
+    assert card in front_page(tried_ones, ["x", "x"])
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_search(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def search(*words: object) -> None:
+        raise AssertionError("a search began")
+
+    monkeypatch.setattr("factory.apps.pareto.command_line.pareto._found", search)
+    (tmp_path / "file").write_text("")
+    done = run("pareto", PAPER, "-o", tmp_path / "file" / "front")
+    assert done.status == 2 and "is a file, not a folder" in done.err

@@ -7,10 +7,12 @@ from pathlib import Path
 import imageio.v3 as iio
 import numpy as np
 import pytest
+import trimesh
 from numpy.typing import NDArray
 
 from factory.apps.planning.exploded import ExplodedView
 from factory.apps.planning.exploding import explosion
+from factory.apps.planning.loose_parts import loose_parts
 from factory.pipeline import read
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
@@ -53,3 +55,11 @@ def is_apart(pixels: NDArray[np.uint8]) -> bool:
     """Whether the upper side of what is red is seen, which shines brighter than its walls."""
     red, green, blue = (pixels[..., k].astype(int) for k in range(3))
     return bool(((red > 200) & (green < 60) & (blue < 60)).sum() > 0.002 * red.size)
+
+
+def test_a_light_stands_as_far_off_as_the_product_is_large() -> None:
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    surfaces = {"a": (np.array(box.vertices), np.array(box.faces))}
+    for size in (0.1, 2.0):
+        m = loose_parts(surfaces, [(1.0, 0.0, 0.0, 1.0)], 0.0, size)
+        assert m.light_pos == pytest.approx(-3.0 * size * m.light_dir, rel=0.01)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations, islice, product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.apps.few_robots.lines import admitted
+from factory.apps.planning import searching
 from factory.apps.planning.blocking import (
     CLASHES,
     DEEPER,
@@ -21,12 +23,13 @@ from factory.apps.planning.blocking import (
     blocking,
 )
 from factory.apps.planning.cannot import cores, interlocks, removal
-from factory.apps.planning.divisions import divisions
+from factory.apps.planning.divisions import Late, divisions
 from factory.apps.planning.exact import Best, Expected, Tree, TreeTask, tables
 from factory.apps.planning.growing import Divider, bettered, divided, units_of
 from factory.apps.planning.judging import Judged, Site
+from factory.apps.planning.laying import LaidOut
 from factory.apps.planning.parts import InPlace
-from factory.apps.planning.searching import Sought, budget_of, trees
+from factory.apps.planning.searching import GROWING, Sought, budget_of, trees
 from factory.apps.planning.source import placed
 from factory.apps.planning.subsets import ROOT_AXIS, Stance, stances, subsets
 from factory.apps.planning.writing import planned_product
@@ -35,6 +38,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
 from factory.floor.mating.mating import matings
 from factory.pipeline import all_templates
+from factory.support.errors import Diagnostic, RunError
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang.pag_reader import read_pag
 
@@ -318,3 +322,51 @@ def test_stances_are_the_rotations_up_to_half_a_turn() -> None:
     for stance in stances():
         assert abs(stance.rotation[0, stance.axes[0]]) == 1
         assert stance.rotation[2, stance.axes[2]] == stance.up
+
+
+def two_units(price: float) -> TreeTask:
+    """Two units that nothing blocks, of a price if their own inputs come along the first axis."""
+    levels, low = np.zeros((3, 2, 2), np.int8), np.array([[0.0, 0, 0], [0.1, 0, 0]])
+    found = Blocking(("a", "b"), levels, levels > 0, np.ones((2, 2), bool), low, low + 0.1)
+    of = divisions(subsets(found), stances()[0].axes[2], stances()[0].up, apart=True)
+    return TreeTask(of, EXPECTED, np.array([[price, price], [0.0, 0.0]]))
+
+
+@pytest.mark.parametrize(("price", "tree"), [(0.4, (0, 1)), (0.6, ((0, 1),))])
+def test_a_relay_is_chosen_where_it_costs_less_than_the_units(price: float, tree: Tree) -> None:
+    task = two_units(price)
+    assert Best(task, None).tree(task.subsets.whole, 1) == tree
+
+
+def test_each_bound_has_an_equal_share_of_the_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    count, used = 20, list[float]()
+    levels, touch = np.zeros((3, count, count), np.int8), np.ones((count, count), bool)
+    low = np.random.default_rng(0).random((count, 3))
+    found = Blocking(tuple(map(str, range(count))), levels, levels > 0, touch, low, low + 0.1)
+    given_ = np.zeros((2, count))
+    asked = Sought(found, EXPECTED, lambda _: given_, "floor", budget_of(count))
+
+    def used_up(
+        _site: Site, _tree: Tree, _bound: float, late: Late, _random: object
+    ) -> list[Judged]:
+        used.append(asked.budget.used)
+        while not late():
+            pass
+        return []
+
+    monkeypatch.setattr(searching, "bettered", used_up)
+    trees(asked)
+    used.append(asked.budget.used)
+    assert np.diff(used) == pytest.approx((GROWING - used[0]) / 3, abs=0.01)
+
+
+def test_a_tree_without_a_layout_takes_for_ever_on_an_endless_floor() -> None:
+    class Unlaid:
+        settings = None
+
+        @property
+        def layout(self) -> None:
+            raise RunError(Diagnostic("NoLayout", "no", None, ""))
+
+    tree: Any = LaidOut(None, (), Unlaid(), 1)  # type: ignore[arg-type]
+    assert tree.seconds == np.inf == tree.area

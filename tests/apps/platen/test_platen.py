@@ -33,6 +33,7 @@ from factory.support.errors import InputError, RunError
 from factory.support.tables import table_of, value_of
 from tests.command_line import Terminal
 from tests.examples import with_hands
+from tests.layout_values import paper_layout
 from tests.paths import ROOT
 
 PACE = Pace()
@@ -207,3 +208,13 @@ def test_a_build_tells_its_tiles(
     assert document["tile_m"] == 0.12
     assert document["tiles"] > 10
     assert 0.2 < document["fill"] < 1.0
+
+
+def test_what_moves_together_stays_as_near_as_it_is() -> None:
+    """Those that move with a robot are compared with others, not with each other."""
+    placing = Placing(Floor(paper_layout()), {})
+    near = np.zeros_like(placing.deep)
+    near[2, 3] = near[3, 2] = 0.1
+    placing.deep = near.copy()
+    placing.look([1, 2, 3])
+    assert (placing.deep == near).all()

@@ -11,6 +11,7 @@ import signal
 import socket
 import sys
 from subprocess import PIPE
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from tests.structured_text import Plc
 pytest.importorskip("asyncua", reason="the extra `opcua` is not installed")
 
 from factory.apps.plc.opcua import SPACE, OpcuaPlant
+from factory.apps.plc.opcua_server import OpcuaServer
 from tests.plc_client import PlcClient
 
 SCAN = 0.01
@@ -192,3 +194,30 @@ async def _read(address: str, *names: str) -> list[Any]:
         space = await client.get_namespace_index(SPACE)
         nodes = [client.get_node(f"ns={space};s=Plant.{name}") for name in names]
         return await client.read_values(nodes)
+
+
+@pytest.mark.parametrize(
+    ("items", "dropped"), [((600, 400), []), ((600, 401, 1), [2, 3]), ((1001,), [1])]
+)
+def test_the_newest_that_monitor_more_than_all_may_are_dropped(items, dropped) -> None:
+    gone = list[int]()
+
+    async def delete(numbers: list[int]) -> None:
+        gone.extend(numbers)
+
+    session = SimpleNamespace(session_id=7)
+    subscriptions = {
+        number: SimpleNamespace(
+            session_id=7, monitored_item_srv=SimpleNamespace(_monitored_items=range(count))
+        )
+        for number, count in enumerate(items, 1)
+    }
+    service = SimpleNamespace(subscriptions=subscriptions, delete_subscriptions=delete)
+    clients = [SimpleNamespace(processor=SimpleNamespace(session=session))]
+    served = OpcuaServer.__new__(OpcuaServer)
+    served.server = SimpleNamespace(
+        iserver=SimpleNamespace(subscription_service=service),
+        bserver=SimpleNamespace(clients=clients),
+    )
+    asyncio.run(served.tidy())
+    assert gone == dropped

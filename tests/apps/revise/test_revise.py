@@ -322,3 +322,15 @@ def test_command_writes_a_family(tmp_path: Path) -> None:
         refused = spawn("mix", *words, "-o", tmp_path / "no.pag", "--json")
         assert (refused.status, refused.codes) == (2, [code])
         assert not (tmp_path / "no.pag").exists()
+
+
+def test_those_that_have_most_in_common_are_paired_first() -> None:
+    sizes = dict(zip("abcdef", range(1, 7), strict=True))
+
+    def of(one: str, others: str, two: str, more: str) -> PAG:
+        subs = f"{one} = mate ( {', '.join(others)} ); {two} = mate ( {', '.join(more)} )"
+        parts = "; ".join(f"{n} = atomic ( density = {sizes[n]}.0 )" for n in others + more)
+        return read_pag(f"root = x; x = mate ( {one}, {two} ); {subs}; {parts}", all_templates())
+
+    renamed = matching(of("p", "ab", "q", "cd"), of("s", "ae", "t", "cf")).renamed
+    assert renamed.items() >= {"p": "s", "q": "t"}.items()

@@ -23,7 +23,7 @@ from scipy import stats
 from factory.apps.sweep import Recipe, points, pool, read_axes, summarise
 from factory.apps.sweep.grid import Value
 from factory.apps.sweep.store import COLUMNS, Store
-from factory.apps.sweep.sweeping import outcomes_of, sweep
+from factory.apps.sweep.sweeping import Tally, outcomes_of, sweep
 from factory.apps.sweep.work import FIGURES, Outcome, Runner
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -531,3 +531,25 @@ def test_a_sweep_without_faults_keeps_nothing_of_them(here: None, tmp_path: Path
     with sqlite3.connect(tmp_path / "db") as connection:
         names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
     assert names == list(COLUMNS) and "fault_rate" not in names and "failures" not in names
+
+
+def test_the_time_of_workers_is_divided_into_run_loops_and_the_rest() -> None:
+    tally, (point,) = Tally(3, 0), points(read_axes(["seed=1"]))
+    tally.count(Outcome(point, figures={"wall_time_s": 2.0}, row_time_s=3.0))
+    tally.count(Outcome(point, figures={"wall_time_s": 1.0}, row_time_s=1.0))
+    tally.count(Outcome(point, "it died", row_time_s=7.0))
+    assert (tally.loops_time_s, tally.rows_time_s, tally.overhead) == (3.0, 4.0, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("text", "example"),
+    [
+        ("timestep=0.001,x", "--vary timestep=auto,0.002"),
+        ("substeps=2,x", "--vary substeps=1,5"),
+        ("wip=", "--vary wip=1:4"),
+    ],
+)
+def test_the_hint_is_an_example_of_the_key(text: str, example: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_axes([text])
+    assert caught.value.diagnostics[0].hint == f"for example {example}"

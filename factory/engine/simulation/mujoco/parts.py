@@ -143,7 +143,6 @@ class Parts:
         self.strength = Strength(m, d, model, self.holdings.grips())
         self.joining = Joining(model, self.holdings, self.welds)
         self.joining.weigh(m, d)
-        mujoco.mj_kinematics(m, d)
         for label, unit, robot in self._under_way(counts, passing):
             self._give(m, label, unit, robot)
         self.feeders.begin()
