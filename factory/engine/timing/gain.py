@@ -16,6 +16,9 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.optimising import first_feasible, floor_of
 from factory.support.settings import Settings
 
+MANY = 400
+"""A factory of so many robots is not laid out again to be compared."""
+
 
 @dataclass(frozen=True, slots=True)
 class Figures:
@@ -31,8 +34,8 @@ class Figures:
 class LayoutGain:
     """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
     and the least cycle time that any layout without relays could have [s]. A layout with chains is
-    compared with none: `first` and `bound` are None. Where there are relays: the figures without
-    them, and how many robots they add."""
+    compared with none: `first` and `bound` are None; one of MANY robots with the bound alone. Where
+    there are relays: the figures without them, and how many robots they add."""
 
     chosen: Figures
     bottleneck: str
@@ -60,13 +63,13 @@ class LayoutGain:
             relays = f"; {words}, {plain.predicted_cycle_time_s:.2f} s without"
             other = " without relays"
         cycle = f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}){relays}"
-        if first is None:
-            return cycle
+        if first is not None:
+            cycle += (
+                f"; first feasible layout {first.predicted_cycle_time_s:.2f} s,"
+                f" {first.area_m2:.2f} m², {first.guidepath_length_m:.2f} m"
+            )
         return (
-            f"{cycle}; first feasible"
-            f" layout {first.predicted_cycle_time_s:.2f} s, {first.area_m2:.2f} m²,"
-            f" {first.guidepath_length_m:.2f} m; no layout{other} below"
-            f" {self.bound:.2f} s"
+            cycle if self.bound is None else f"{cycle}; no layout{other} below {self.bound:.2f} s"
         )
 
 
@@ -79,11 +82,14 @@ def gain(layout: Layout, settings: Settings, hands: Hands, wip: int | None = Non
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
     size, chosen = Clearance(c, factory.carriage), None if layout.stems else hands
-    first = first_feasible(factory, product, size, (), chosen)
+    first = None
+    if len(factory.robots) < MANY:
+        laid = first_feasible(factory, product, size, (), chosen)
+        first = _figures(laid, _cycle(laid, settings, wip))
     return LayoutGain(
         _figures(layout, cycle),
         cycle.bottleneck,
-        _figures(first, _cycle(first, settings, wip)),
+        first,
         cycle_time_bound(factory, product, c, soonest(settings)),
         _figures(plain, _cycle(plain, settings, wip)) if layout.plain else None,
         len(layout.factory.robots) - len(factory.robots),
