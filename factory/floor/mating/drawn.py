@@ -70,10 +70,8 @@ class _Measurements:
             return
         onto = np.abs(turn).argmax(axis=0).tolist()
         order = [slice(None, None, 1 if turn[onto[axis], axis] > 0 else -1) for axis in range(3)]
-        back = [slice(None, None, -one.step) for one in order]
         for (one, standing, still, axis), row in other.pairs.items():
             self.pairs[one, standing, still, onto[axis]] = _ordered(row, order[axis])
-            self.pairs.setdefault((standing, one, still, onto[axis]), _ordered(row, back[axis]))
         for one, standing, axis, sign in other.free:
             self.free.add((one, standing, onto[axis], sign * order[axis].step))
         for (one, standing), shared in other.finished.items():
@@ -169,10 +167,13 @@ class DrawnWays:
         return bool(self._body(one).min_gap(self._body(other), 2 * gap) <= gap)
 
     def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
-        key = self._labels[moving], self._labels[standing], still, axis
-        if key not in self._found.pairs:
-            self._found.pairs[key] = self._pair(moving, standing, still, axis)
-        return self._found.pairs[key]
+        one, other, pairs = self._labels[moving], self._labels[standing], self._found.pairs
+        key, swapped = (one, other, still, axis), (other, one, still, axis)
+        if key not in pairs and swapped in pairs:  # the other part moves, to the other side
+            pairs[key] = _ordered(pairs[swapped], slice(None, None, -1))
+        elif key not in pairs:
+            pairs[key] = self._pair(moving, standing, still, axis)
+        return pairs[key]
 
     def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         finished = self.finished(moving, standing).depth
