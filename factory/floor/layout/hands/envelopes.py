@@ -18,7 +18,7 @@ from factory.support.arrays import Array, Index, Truth
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
 
-MANY = 1 << 15
+MANY = 1 << 16
 """The most pairs of points and faces whose room is computed for each pair."""
 
 DEEP = 10
