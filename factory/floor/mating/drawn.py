@@ -30,11 +30,15 @@ from factory.floor.geometry.overlap import (
 )
 from factory.floor.geometry.solids import Product, rotation
 from factory.floor.mating.bodies import ConvexBodies
+from factory.floor.mating.depth import solid_hull
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.support.arrays import Array, Indices
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
+
+SOME = 500
+"""The hull of so many vertices of a mesh may show that it is not convex."""
 
 QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
@@ -310,5 +314,8 @@ def is_exact(mesh: Mesh) -> bool:
     if not is_closed(mesh.faces):
         return False
     volume = volume_of(mesh.vertices, mesh.faces)
+    some = solid_hull(mesh.vertices[:: -(-len(mesh.vertices) // SOME)])
+    if not mesh.pieces and some is not None and some.volume > (1 + ALIKE) * volume:
+        return False  # nor is the hull of all, which is larger
     bodies = [hull_of(piece) for piece in mesh.pieces] or [mesh.hull]
     return abs(sum(body.volume for body in bodies) - volume) <= ALIKE * volume
