@@ -16,7 +16,7 @@ from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.smoothing import smooth
 from factory.film.video import VideoFile, check_output
-from factory.floor.geometry.overlap import drawn, merged
+from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.sight import View, fit, towards
 
 FPS = 15.0
@@ -152,7 +152,10 @@ def _surface(solid: Solid, within: float) -> tuple[Array, Indices]:
     """The surface of a solid in place, with fewer triangles where these are about `within` a
     distance [m] of it."""
     body = drawn(solid) if within and solid.mesh is not None else None
-    return surface(solid) if body is None else merged(body.simplify(within).to_mesh64())
+    if body is None:
+        return surface(solid)
+    mesh = body.simplify(within).to_mesh64()
+    return np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64)
 
 
 def _evened(values: Array) -> Array:
