@@ -84,7 +84,7 @@ def check_count(path: Path, labels: Sequence[str], what: str = "parts") -> None:
 
 def box_of(body: FileBody) -> tuple[Array, Array]:
     """The bounding box of a body: low (3,), high (3,)."""
-    used = np.concatenate([vertices[np.unique(faces)] for vertices, faces in body.mesh.bodies])
+    used = np.concatenate([vertices[faces.ravel()] for vertices, faces in body.mesh.bodies])
     return used.min(axis=0), used.max(axis=0)
 
 

@@ -111,7 +111,8 @@ def _assembled(
     colour get the same one, by their size."""
     here, store = Position(str(path), 1, 1), MeshStore("meshes")
     drafts = [DraftNode(name, here, inputs=list(range(1, len(bodies) + 1)))]
-    shapes = [shape_of(*_scaled(body.mesh.merged(), unit)) for body in bodies]
+    surfaces = [_scaled(body.mesh.merged(), unit) for body in bodies]
+    shapes = [shape_of(*surface) for surface in surfaces]
     kinds, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
     names = [_name(body, index) for index, body in enumerate(bodies)]
     paints = colours_by_size(kinds_of(kinds.kinds, names, *_sizes(shapes)))
@@ -120,7 +121,7 @@ def _assembled(
         if kind == index:
             low, high = shapes[index].vertices.min(axis=0), shapes[index].vertices.max(axis=0)
             origins[kind] = np.round((low + high) / 2, 6)
-            vertices, faces = _scaled(body.mesh.merged(), unit)
+            vertices, faces = surfaces[index]
             content = obj_of(vertices - origins[kind], faces, "made by factory plan; metres")
             meshes[kind] = store.add(_name(body, index), ".obj", content)
         at = motion.turn @ origins[kind] + motion.shift

@@ -105,6 +105,14 @@ class LaidOut:
         rough = [float(np.round(np.log(max(x, 1e-9)) / ALIKE)) for x in order]
         return self.blocked, self.held, rough[0], self.kinds, *rough[1:]
 
+    def is_behind(self, best: LaidOut) -> bool:
+        """Whether another is better even if this one's layout is perfect: fewer operations are
+        blocked, or fewer sub-assemblies cannot be held. One whose screws share robots has another
+        layout, in which they do not."""
+        if self.lines:
+            return False
+        return (self.blocked, self.held) > (best.blocked, best.held)
+
 
 class Layouts:
     """The layouts of a source's trees. The geometry is computed once per stance: meshes are
@@ -213,12 +221,14 @@ class Layouts:
         aim: Aim,
         budget: Allowance,
         report: Callable[[LaidOut], None] = lambda _: None,
+        known: Sequence[LaidOut] = (),
     ) -> LaidOut:
-        """The best of some trees, or of those about as good the one that makes most sense. As many
-        are laid out as the budget permits, at least the first: those of LAID robots together, or as
-        many as time permits, where the next one is assumed to take as long as the longest did. A
+        """The best of those that are `known` and some trees, or of those about as good the one that
+        makes most sense. As many are laid out as the budget permits, at least one: those of LAID
+        robots together, or as many as time permits, where the next one is assumed to take as long
+        as the longest did; what is known to be worse before it is laid out counts as well. A
         KeyboardInterrupt, or OutOfTime, ends the layout of any but the first."""
-        every: list[LaidOut] = []
+        every = [*known]
         longest, robots = 0.0, 0
         for judged in trees:
             robots += judged.robots
@@ -227,13 +237,15 @@ class Layouts:
                 break
             begin = perf_counter()
             try:
-                laid = self.or_alone(self.of(judged))
-                laid.rank(aim)
+                laid = self.of(judged)
+                if not (every and laid.is_behind(best_of(every, aim))):
+                    laid = self.or_alone(laid)
+                    laid.rank(aim)
+                    every.append(laid)
             except (KeyboardInterrupt, OutOfTime):
                 if not every:
                     raise
                 break
-            every.append(laid)
             report(best_of(every, aim))
             longest = max(longest, perf_counter() - begin)
         return best_of(every, aim)

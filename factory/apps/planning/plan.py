@@ -35,7 +35,7 @@ from factory.apps.planning.exact import Expected
 from factory.apps.planning.falling import held_by, senseless
 from factory.apps.planning.fastening import fasteners
 from factory.apps.planning.judging import Join, Judged
-from factory.apps.planning.laying import LaidOut, Layouts, OutOfTime, best_of
+from factory.apps.planning.laying import LaidOut, Layouts, OutOfTime
 from factory.apps.planning.parts import InPlace, refuse_hidden
 from factory.apps.planning.posing import (
     Pose,
@@ -258,9 +258,9 @@ def _planned(pose: Pose, asked: PlanOptions, budget: Allowance) -> Planned:
         if seeking is None or budget.left == 0.0 or len(graphs) - len(screws) > MOST:
             break
         again = seeking.trees(replace(budget, spent=0))
-        other = layouts.best(again.all[:AGAIN], asked.aim, budget, said)
-        if best_of([best, other], asked.aim) is other:
-            best, sought = other, again
+        better = layouts.best(again.all[:AGAIN], asked.aim, budget, said, [best])
+        if better is not best:
+            best, sought = better, again
     return replace(_result(pose, best, sought.optimal, laid[0], firm), screws=named)
 
 

@@ -86,6 +86,8 @@ def in_pieces(mesh: Mesh, stood_in: bool = False, decomposed: bool = True) -> Me
     if not decomposed:
         return mesh
     alone = [Mesh(mesh.name, *body) for body in bodies]
+    if len(alone) == 1 and len(alone[0].vertices) == len(mesh.vertices):
+        alone = [mesh]  # whose hull is known
     if any(volume_of(body.vertices, body.faces) <= 0 for body in alone):
         alone = [mesh]  # a cavity is no body
     each = [_pieces(body, stood_in) for body in alone or [mesh]]

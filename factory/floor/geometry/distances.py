@@ -6,8 +6,8 @@ import numpy as np
 
 from factory.support.arrays import Array
 
-CHUNK = 400_000
-"""The most distances between points and triangles that are computed at a time."""
+MANY = 1 << 14
+"""The most distances between points and triangles that are computed for each pair."""
 
 ROUNDING = 1e-9
 """Distances that differ by no more may be equal [m]."""
@@ -16,19 +16,32 @@ ROUNDING = 1e-9
 def distances_to(points: Array, triangles: Array) -> Array:
     """The distance (n,) [m] of each point from the nearest of triangles (m, 3, 3); infinite if
     there are none."""
-    distances = np.full(len(points), np.inf)
-    step = max(1, CHUNK // max(1, len(triangles)))
-    for first in range(0, len(points) if len(triangles) else 0, step):
-        rows = slice(first, first + step)
-        distances[rows] = _to_triangles(points[rows], triangles)
+    if not len(triangles):
+        return np.full(len(points), np.inf)
+    middles = triangles.mean(axis=1)
+    balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
+    return _to_nearest(points, triangles, middles, balls)
+
+
+def _to_nearest(points: Array, triangles: Array, middles: Array, balls: Array) -> Array:
+    """The same for triangles in balls of known radii (m,) about their `middles` (m, 3). Of many
+    pairs the points are divided in halves, and those triangles are looked at that may be the
+    nearest of any."""
+    if len(points) * len(triangles) <= MANY or len(points) == 1:
+        return _to_triangles(points, triangles, middles, balls)
+    low, high = points.min(axis=0), points.max(axis=0)
+    apart, across = np.linalg.norm(middles - (low + high) / 2, axis=1), np.linalg.norm(high - low)
+    near = apart - balls <= apart.min() + across + ROUNDING
+    order = np.argsort(points[:, (high - low).argmax()], kind="stable")
+    distances = np.empty(len(points))
+    for half in np.array_split(order, 2):
+        distances[half] = _to_nearest(points[half], triangles[near], middles[near], balls[near])
     return distances
 
 
-def _to_triangles(points: Array, triangles: Array) -> Array:
-    """The distance (n,) of each point from the nearest of triangles (m, 3, 3). Candidates are the
-    triangles whose bounding balls are as near as the nearest centre."""
-    middles = triangles.mean(axis=1)
-    balls = np.linalg.norm(triangles - middles[:, None], axis=2).max(axis=1)
+def _to_triangles(points: Array, triangles: Array, middles: Array, balls: Array) -> Array:
+    """The same. Candidates are the triangles whose bounding balls are as near as the nearest
+    middle."""
     squared = (points**2).sum(axis=1)[:, None] + (middles**2).sum(axis=1)
     apart = np.sqrt(np.maximum(squared - 2 * points @ middles.T, 0.0))
     row, column = np.nonzero(apart - balls <= apart.min(axis=1)[:, None] + ROUNDING)

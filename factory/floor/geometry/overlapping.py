@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from math import ceil
 
 import numpy as np
@@ -148,14 +149,15 @@ def stood_in(solids: Sequence[Solid]) -> frozenset[str]:
         return frozenset()
     from manifold3d import Manifold
 
-    labels: set[str] = set()
+    labels, hull = set[str](), cache(lambda number: Manifold.hull_points(solids[number].corners))
     for pair in pairs:
-        for solid, other in ((solids[one], drawn(solids[two])) for one, two in (pair, pair[::-1])):
+        for one, two in (pair, pair[::-1]):
+            solid, other = solids[one], drawn(solids[two])
             body = drawn(solid) if solid.label in hulls - labels else None
             if body is not None and other is not None:
-                inside = Manifold.hull_points(solid.corners) ^ other
-                film = SILENT * inside.surface_area()
-                if inside.volume() > (body ^ other).volume() + film:
+                inside = hull(one) ^ other
+                beyond = inside.volume() - SILENT * inside.surface_area()
+                if beyond > 0.0 and beyond > (body ^ other).volume():
                     labels.add(solid.label)
     return frozenset(labels)
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 SMALL = 1e-12
 
-MANY = 1 << 14
+MANY = 1 << 16
 """The most pairs of normals and vertices that are looked at each."""
 
 CORNERS = np.array([*product((0.0, 1.0), repeat=3)])

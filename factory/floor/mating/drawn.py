@@ -30,11 +30,15 @@ from factory.floor.geometry.overlap import (
 )
 from factory.floor.geometry.solids import Product, rotation
 from factory.floor.mating.bodies import ConvexBodies
+from factory.floor.mating.depth import solid_hull
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.support.arrays import Array, Indices
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""
+
+SOME = 500
+"""The hull of so many vertices of a mesh may show that it is not convex."""
 
 QUICK, SURELY = 8, 10 * TOLERANCE
 """With so few samples a clash that is deeper than this [m] is told from a touch."""
@@ -70,10 +74,8 @@ class _Measurements:
             return
         onto = np.abs(turn).argmax(axis=0).tolist()
         order = [slice(None, None, 1 if turn[onto[axis], axis] > 0 else -1) for axis in range(3)]
-        back = [slice(None, None, -one.step) for one in order]
         for (one, standing, still, axis), row in other.pairs.items():
             self.pairs[one, standing, still, onto[axis]] = _ordered(row, order[axis])
-            self.pairs.setdefault((standing, one, still, onto[axis]), _ordered(row, back[axis]))
         for one, standing, axis, sign in other.free:
             self.free.add((one, standing, onto[axis], sign * order[axis].step))
         for (one, standing), shared in other.finished.items():
@@ -169,10 +171,13 @@ class DrawnWays:
         return bool(self._body(one).min_gap(self._body(other), 2 * gap) <= gap)
 
     def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
-        key = self._labels[moving], self._labels[standing], still, axis
-        if key not in self._found.pairs:
-            self._found.pairs[key] = self._pair(moving, standing, still, axis)
-        return self._found.pairs[key]
+        one, other, pairs = self._labels[moving], self._labels[standing], self._found.pairs
+        key, swapped = (one, other, still, axis), (other, one, still, axis)
+        if key not in pairs and swapped in pairs:  # the other part moves, to the other side
+            pairs[key] = _ordered(pairs[swapped], slice(None, None, -1))
+        elif key not in pairs:
+            pairs[key] = self._pair(moving, standing, still, axis)
+        return pairs[key]
 
     def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         finished = self.finished(moving, standing).depth
@@ -309,5 +314,8 @@ def is_exact(mesh: Mesh) -> bool:
     if not is_closed(mesh.faces):
         return False
     volume = volume_of(mesh.vertices, mesh.faces)
+    some = solid_hull(mesh.vertices[:: -(-len(mesh.vertices) // SOME)])
+    if not mesh.pieces and some is not None and some.volume > (1 + ALIKE) * volume:
+        return False  # nor is the hull of all, which is larger
     bodies = [hull_of(piece) for piece in mesh.pieces] or [mesh.hull]
     return abs(sum(body.volume for body in bodies) - volume) <= ALIKE * volume

@@ -18,7 +18,7 @@ from factory.support.arrays import Array, Index, Truth
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
 
-MANY = 1 << 15
+MANY = 1 << 16
 """The most pairs of points and faces whose room is computed for each pair."""
 
 DEEP = 10
@@ -57,13 +57,19 @@ class Faces:
         return Faces(self.along[which], self.across[:, which], self.offsets[which])
 
     def nearest(self, at: Array, radius: Array) -> Index:
-        """For each of some discs (n,) about points (n, 2) the number of the face of least room."""
-        low, high = at.min(axis=0), at.max(axis=0)
-        corners = np.array([*product(*zip(low, high, strict=True))])
-        ends = [np.full(len(corners), end) for end in (radius.min(), radius.max())]
-        rooms = np.concatenate([self.room_of(corners, end) for end in ends])
-        kept = np.flatnonzero(_least_somewhere(rooms))
-        return np.asarray(kept[self.among(kept).room_of(at, radius).argmin(axis=1)])
+        """For each of some discs (n,) about points (n, 2) the number of the face of least room. Of
+        many discs and faces the discs are divided in halves."""
+        if len(at) * len(self) <= MANY or len(at) == 1:
+            return np.asarray(self.room_of(at, radius).argmin(axis=1))
+        measures = np.column_stack([at, radius])
+        low, high = measures.min(axis=0), measures.max(axis=0)
+        ends = np.array([*product(*zip(low, high, strict=True))])
+        kept = np.flatnonzero(_least_somewhere(self.room_of(ends[:, :2], ends[:, 2])))
+        number, some = np.empty(len(at), np.intp), self.among(kept)
+        order = np.argsort(measures[:, (high - low).argmax()], kind="stable")
+        for half in np.array_split(order, 2):
+            number[half] = kept[some.nearest(at[half], radius[half])]
+        return number
 
 
 class Envelope:

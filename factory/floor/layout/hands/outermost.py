@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from factory.floor.layout.hands.envelopes import FLAT
-from factory.floor.layout.hands.surfaces import Body, blocks
+from factory.floor.layout.hands.surfaces import Body
 from factory.support.arrays import Array, Index
 
 MANY = 1 << 14
@@ -41,7 +41,8 @@ def outermost(
             np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),
         )
-        for near in blocks(np.flatnonzero((beside < radii) & (reach < out - SAME))):
+        near = np.flatnonzero((beside < radii) & (reach < out - SAME))
+        if len(near):
             reached = (
                 out if body.boxed else _within(body, points[near], radii[near], side, reach[near])
             )

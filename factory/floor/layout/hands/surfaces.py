@@ -19,7 +19,7 @@ from factory.floor.geometry.pieces import BOX_FACES, is_box
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.layout.hands.envelopes import FLAT, Envelope, Faces
 from factory.floor.mating.depth import polytope_of, solid_hull
-from factory.support.arrays import Array, Index, Truth
+from factory.support.arrays import Array, Truth
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
@@ -32,10 +32,6 @@ TOUCH = 1e-5
 
 FEW = 4
 """Of more boxes than this those that are near are looked for first."""
-
-BLOCK = 256
-"""Of so many points it is looked at together where they are on a body of many faces: what is worked
-out for each point and face stays in the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,12 +181,6 @@ class Surfaces:
             enter, leave = body.crossed(points[near], axis)
             reach[near] = np.maximum(reach[near], leave if way > 0 else -enter)
         return reach
-
-
-def blocks(numbers: Index) -> Iterator[Index]:
-    """Numbers (n,) in blocks of BLOCK."""
-    for begin in range(0, len(numbers), BLOCK):
-        yield numbers[begin : begin + BLOCK]
 
 
 def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
