@@ -39,23 +39,6 @@ def mode_of(template: Template, setting: Setting) -> Mode:
     return law_of(template)(template, setting)
 
 
-def test_navigation_takes_goals_pairs_and_meetings_from_the_template() -> None:
-    mode = mode_of(MATE, SETTING)
-    assert np.allclose(mode.goals, [0.1, 0.1, 0.8])
-    assert mode.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
-    assert np.allclose(mode.meet, np.array([[0, 0], [0, 0.8], [0, 0.8]]))
-    assert np.allclose(mode.touch, [0.05, 0.075, 0.075])
-    assert mode.eps == 1e-3 and mode.dwell == 0.0
-    assert mode.trapped == ()
-
-
-def test_meeting_short_of_the_end_and_eps_of_the_template() -> None:
-    meeting = (Point("A", 1), Point("A", 2), Point("B", 3, -2.0))
-    law = replace(MATE.law, eps=2e-3)
-    mode = mode_of(replace(MATE, identifications=(meeting,), law=law), SETTING)
-    assert np.allclose(mode.meet[1], [0.0, 0.6]) and mode.eps == 2e-3
-
-
 def test_stations_gates_width_and_dwell() -> None:
     insert = Template(
         name="insert",

@@ -52,49 +52,6 @@ def test_refuses_what_is_no_mode(changes: dict[str, Any], message: str) -> None:
         two(**changes)
 
 
-def test_a_goal_ball_may_be_as_near_as_its_diameter() -> None:
-    assert two(touch=[4 * R - 2.5e-3]).eps == 1e-3
-
-
-def test_values_are_copied_and_locked() -> None:
-    goals = np.array([0.7, 0.2])
-    mode = two(goals=goals)
-    goals[0] = 0.9
-    assert mode.goals[0] == 0.7
-    with pytest.raises(ValueError, match="read-only"):
-        mode.goals[0] = 0.9
-
-
-def test_reach_keeps_the_goal_clear_of_obstacles() -> None:
-    assert two().reach == pytest.approx([1.5 * R])
-    assert two(goals=[0.5 + 2 * R, 1.2 * R]).reach == pytest.approx([1.2 * R])
-    assert two().trapped == ()
-
-
-def test_a_tool_that_parks_at_the_junction_may_trap_the_carrier() -> None:
-    """But from the side it comes from the carrier never meets it; or shorten its interval."""
-    parked = two(goals=[0.5 + 2 * R, 0.0])
-    assert parked.trapped == ((0, 1),)
-    assert parked.clear_from(np.array([1.0, 0.5]))
-    assert not parked.clear_from(np.array([0.2, 0.5]))
-    assert two(goals=[0.5 + 2 * R, 0.0], lower=[0.5, 0.0]).trapped == ()
-
-
-def test_a_trapped_mode_traps() -> None:
-    bundle = Bundle.of([two(goals=[0.5 + 2 * R, 0.0])], [Limits(np.ones(2), np.ones(2))])
-    x = np.array([0.2, 0.0])
-    for _ in range(5000):
-        x = x + bundle.field(x, 1e-3) * 1e-3
-    assert bundle.in_domain(x) == [True]
-    assert bundle.at_goal(x) == [False]
-
-
-def test_each_robot_is_ordered_after_its_gate() -> None:
-    gate, standoff = [2, 0, -1], [0.1, 0.1, 0.0]
-    mode = Mode(np.zeros(3), np.zeros(3), np.ones(3), 1e-3, gate=np.array(gate), standoff=standoff)  # type: ignore[arg-type]
-    assert mode.order == (2, 0, 1)
-
-
 @pytest.mark.parametrize("limits", [([1.0], [0.0]), ([np.inf], [1.0]), ([1.0, 1.0], [1.0])])
 def test_limits_are_positive_and_complete(limits: tuple[list[float], list[float]]) -> None:
     with pytest.raises(ValueError, match=r"limits|speeds"):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from math import cos, pi, sin
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.film import dress
 from factory.film.drawn import drawn
 from factory.film.lettering import GLYPHS, height, lettering
-from factory.film.outfits import OUT, carriage
+from factory.film.outfits import OUT
 from factory.film.smoothing import smooth
 from factory.support.engine import mujoco
 from tests.examples import with_hands
@@ -92,24 +91,6 @@ def away(m: mujoco.MjModel, d: mujoco.MjData, geom: int, points: np.ndarray) -> 
 def test_nothing_drawn_lies_outside_what_is_solid(name: str) -> None:
     for geom, far in outside(*models(name)):
         assert far <= STANDS_OUT.get(geom, OUT) + 1e-5, geom
-
-
-def test_what_stands_out_further_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(STANDS_OUT, "outfeed/sides/skin", OUT)
-    assert [geom for geom, far in outside(*models("paper")) if far > OUT + 1e-5] == [
-        "outfeed/sides/skin"
-    ]
-
-
-@given(seen=st.floats(-pi, pi))
-def test_the_number_of_a_robot_is_on_the_near_side_of_its_mast(seen: float) -> None:
-    half = (0.030, 0.030, 0.0175)
-    (number,) = (layer.skin.at for layer in carriage(half, "r12", seen) if layer.what == "number")
-    middle = (number.min(axis=0) + number.max(axis=0))[:2] / 2
-    out = middle @ (cos(seen), sin(seen))
-    assert out > -1e-3  # beside it at worst, where the arm goes towards the camera
-    assert (np.abs(number[:, :2]) <= 0.030 - 4e-3).all()
-    assert (np.abs(number[:, :2]).max(axis=1) >= 0.009).all()  # where the mast ends
 
 
 @given(text=st.text(st.sampled_from([*GLYPHS, *"abc ÄÉß"]), min_size=1, max_size=9))

@@ -41,13 +41,6 @@ def test_without_vulkan_stills_are_classic_and_filament_is_refused(
     assert filament.APT in said.hint and "--renderer classic" in said.hint
 
 
-@pytest.mark.usefixtures("untried")
-def test_what_is_classic_tries_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(filament, "fault", None)
-    assert not filament.draws("classic", still=True)
-    assert not filament.draws("auto", still=False)
-
-
 def test_a_second_thread_does_not_draw(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(filament, "fault", lambda: None)
     monkeypatch.setattr(filament, "_threads", {-1})
@@ -73,16 +66,6 @@ def test_the_environment_is_a_cube_map_of_the_studio() -> None:
 BALL = "<mujoco><worldbody><geom size='1' rgba='1 0 0 1'/></worldbody></mujoco>"
 AXES = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 VIEW = View(np.array([0.0, -6.0, 0.0]), AXES, 0.3, 0.3, 6.0, 1.0)
-
-
-def test_filament_draws_and_keeps_the_output_clean(capfd: pytest.CaptureFixture[str]) -> None:
-    if filament.fault() is not None:
-        pytest.skip("Vulkan does not work here")
-    model = mujoco.MjModel.from_xml_string(BALL)
-    with filament.Filament(Replica(model), (64, 48)) as renderer:
-        red, green, _ = renderer.mean(VIEW, 4)[24, 32]
-    assert red > 2 * green
-    assert capfd.readouterr() == ("", "")
 
 
 def test_filament_leaves_out_what_is_left_out_of_a_replica() -> None:

@@ -86,20 +86,7 @@ def check(count: int) -> None:
     assert max(off for _, off in results) < TRACKING
 
 
-def test_pairs_touch_nothing() -> None:
-    """Some runs."""
-    check(12)
-
-
 @pytest.mark.slow
 def test_three_hundred_pairs_touch_nothing() -> None:
     """The campaign."""
     check(300)
-
-
-def test_robots_that_ignore_each_other_touch(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A planted fault: no reservations."""
-    every = "tests.reservation.admitted"
-    monkeypatch.setattr(every, lambda present, *_: np.ones(len(present), dtype=bool))
-    m, ticks = model(), planned(30)
-    assert sum(driven(m, ticks[:, :, pair])[0] > 0 for pair in range(ticks.shape[2])) > 5

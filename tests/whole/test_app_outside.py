@@ -23,8 +23,6 @@ CACHES: tuple[Any, ...] = (
 )
 """What is kept of the apps that there are."""
 
-FACES = "1 2 4 3;5 7 8 6;1 5 6 2;3 4 8 7;1 3 7 5;2 6 8 4"
-"""Those of a box whose corners are numbered by x, then y, then z."""
 
 Move = Callable[[str], None]
 
@@ -74,19 +72,6 @@ def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Move]:
     sys.modules.update(here)
 
 
-@pytest.fixture
-def boxes(tmp_path: Path) -> Path:
-    """A folder of two boxes, one upon the other."""
-    folder = tmp_path / "boxes"
-    folder.mkdir()
-    faces = "".join(f"f {face}\n" for face in FACES.split(";"))
-    for name, low in {"lower": 0.0, "upper": 0.02}.items():
-        corners = [(x, y, low + z) for x in (0, 0.04) for y in (0, 0.04) for z in (0, 0.02)]
-        text = "".join("v {} {} {}\n".format(*corner) for corner in corners)
-        (folder / f"{name}.obj").write_text(text + faces)
-    return folder
-
-
 def same(run: Terminal, moved: Move, name: str, *words: object) -> Any:
     """What an app prints in this package, which it prints from a package of its own, too."""
     here = run(*words)
@@ -100,26 +85,3 @@ def same(run: Terminal, moved: Move, name: str, *words: object) -> Any:
 
 def test_a_study(run: Terminal, moved: Move) -> None:
     assert same(run, moved, "analyze", "analyze", PAPER, "--json")["cycle_time_s"] > 1
-
-
-def test_a_planner(run: Terminal, moved: Move, boxes: Path, tmp_path: Path) -> None:
-    out, explained = tmp_path / "out", run("--explain", "CannotAssemble").out
-    words = "plan", boxes, "-o", out, "--unit", "m", "--no-look", "--json"
-    assert same(run, moved, "planning", *words)["parts"] == 2
-    assert (out / "boxes.pag").is_file()
-    assert "CannotAssemble" not in explanations.codes()
-    assert run("--explain", "CannotAssemble").out == explained != ""
-
-
-def test_a_variant_of_a_layout(moved: Move) -> None:
-    moved("platen")
-    assert apps.layout_variant("platen").__module__ == "outside_platen.platen"
-
-
-def test_without_its_package_the_command_is_not_there(
-    run: Terminal, moved: Move, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    moved("analyze")
-    monkeypatch.setattr(sys, "path", [p for p in sys.path if p != str(tmp_path / "site")])
-    done = run("analyze", PAPER)
-    assert done.status == 2 and "there is no command 'analyze'" in done.err

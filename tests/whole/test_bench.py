@@ -14,10 +14,8 @@ from benches.compare.__main__ import REPORT as COMPARISON
 from benches.faults.__main__ import REPORT as FAULTS
 from benches.fidelity.__main__ import REPORT as FIDELITY
 from benches.reporting import Report
-from benches.speed import floors, large, processes, production, replaying
+from benches.speed import large, processes
 from benches.speed.__main__ import REPORT
-from benches.speed.factories import laid_out, produce, robots_at_least
-from factory.engine.simulation.simulation import Simulation
 
 KEPT = [
     (report, file)
@@ -40,36 +38,6 @@ def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) ->
 )
 def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
     assert report.text() == report.path.read_text()
-
-
-@pytest.mark.parametrize(("asked", "robots"), [(1, 1), (10, 11), (41, 41)])
-def test_a_factory_has_the_robots_asked_for_or_one_more(asked: int, robots: int) -> None:
-    assert len(laid_out(robots_at_least(asked)).factory.robots) == robots
-
-
-@pytest.mark.parametrize("timestep", production.TIMESTEPS)
-@pytest.mark.parametrize("units", [None, 2])
-def test_production_is_measured(timestep: float | None, units: int | None) -> None:
-    found = production.work(4, timestep, fuse=True, units=units, window=0.5)
-    assert found["robots"] == 5 and found["realtime"] > 0
-    assert found["from_s"] == 0.0 if units else found["to_s"] - found["from_s"] >= 0.5
-    assert units is None or found["made"] == units
-
-
-def test_a_run_that_does_not_succeed_is_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted: something touches, and nothing fires for longer than is borne."""
-
-    def touched(simulation: Simulation, units: int) -> None:
-        produce(simulation, units)
-        simulation.physical.inspection.onsets.note({(0, 1)}, 1.0)
-
-    with monkeypatch.context() as planted:
-        planted.setattr(production, "produce", touched)
-        with pytest.raises(SystemExit, match="unintended contact"):
-            production.work(4, fuse=True, units=1)
-    monkeypatch.setattr(Simulation, "patience", 0.1)
-    with pytest.raises(SystemExit, match=r"nothing fired for 0\.10 s"):
-        production.work(4, fuse=True, units=1)
 
 
 def test_a_process_that_fails_ends_the_bench_with_what_it_says() -> None:
@@ -112,26 +80,6 @@ def test_a_digest_of_the_physics_is_of_models_and_runs(
     kept[case][file] = "another"
     (tmp_path / "oracle.json").write_text(json.dumps(kept))
     assert (reporting.physics(tmp_path / "oracle.json") != reporting.physics()) == of_it
-
-
-@pytest.mark.parametrize("units", [None, 2])
-@pytest.mark.parametrize("fuse", [False, True])
-def test_the_bare_engine_comes_to_the_same_state(fuse: bool, units: int | None) -> None:
-    """`work` compares the state of the replay with that of the run."""
-    found = floors.work(4, None, fuse=fuse, units=units, window=0.5)
-    assert found["bare"] > 0 and found["run"] > 0
-
-
-def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted fault: setpoints are not written."""
-    replay = replaying.replay
-
-    def forgetful(m, d, writes) -> float:
-        return replay(m, d, [([w for w in written if w[0] != 1], n) for written, n in writes])
-
-    monkeypatch.setattr(replaying, "replay", forgetful)
-    with pytest.raises(AssertionError, match="another state"):
-        floors.work(4, None, units=1)
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ import factory
 from factory.apps.exports import exporters
 from factory.engine.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates
-from factory.theory.lang import read_pag, read_template, write_template
+from factory.theory.lang import read_pag
 from factory.theory.problem.robot_types import load_catalogue
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
@@ -45,14 +45,6 @@ def smallest_product(template: Template) -> str:
         return "root = s; s = mate ( p0, p1, p2 ); p2 = atomic (); " + "; ".join(made)
     operation = f"s = {template.name} ( {', '.join(parts)} )"
     return f"root = t; t = weld ( s, dwell = 0.1 ); {operation}; " + "; ".join(made)
-
-
-@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
-def test_templates_read_and_write_back(file: Path) -> None:
-    template = read_template(file.read_text("utf-8"), str(file))
-    assert template.name == file.stem
-    assert read_template(write_template(template)) == template
-    assert all_templates()[file.stem] == template
 
 
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])
@@ -88,16 +80,6 @@ def test_robot_types_load(name: str) -> None:
     model = load_robot_model(robot)
     assert model.name == name
     assert ElementTree.parse(robot.mjcf).getroot().get("model") == name
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_robot_types_are_what_they_extend(name: str) -> None:
-    catalogue = load_catalogue()
-    assert catalogue.fits(name, name)
-    ancestor = catalogue[name].extends
-    if ancestor:
-        assert catalogue.fits(name, ancestor)
-        assert not catalogue.fits(ancestor, name)
 
 
 def test_every_file_of_the_folder_is_in_the_catalogue() -> None:

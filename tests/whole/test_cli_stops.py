@@ -4,35 +4,18 @@ something."""
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
-import imageio.v3 as iio
 import pytest
 
-from factory.apps.log import read_log
 from factory.film.reel import Reel
-from factory.support.errors import MissingError
-from factory.support.gl import probe
-from tests.command_line import Terminal, spawn_each, started
+from tests.command_line import Terminal, spawn_each
 from tests.core.test_progress import STOPPED, stopped
 from tests.paths import PAPER, ROOT, files_in
-from tests.waiting import grown
 
 # --- a run that fails, or is stopped --------------------------------------------------------------
-
-
-def test_a_run_that_fails_says_where(run: Terminal, out: Path) -> None:
-    log = out / "run.log"
-    done = run("run", PAPER, "--units", 50, "--max-time", 1.5, "--log", log, "--json")
-    assert done.status == 1
-    assert done.codes == ["Timeout"]
-    assert done.json["errors"][0]["line"] == 4
-    assert f"{PAPER}:4:1: Timeout" in done.err
-    assert done.json["products"] == 0
-    assert read_log(log).complete
 
 
 @pytest.mark.parametrize(
@@ -62,33 +45,6 @@ def test_absurd_products_come_to_an_end(
         assert done.codes == ["BadValue"]
         assert done.json["errors"][0]["col"] in (44, 47, 56, 60)
     assert "RuntimeWarning" not in done.err
-
-
-def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
-    done = run("build", PAPER, "--floor", "0.1x0.1", "-o", out / "all", "--json")
-    assert done.status == 1
-    assert done.codes == ["Layout"]
-    assert list(out.iterdir()) == []
-
-
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=lambda n: n.name)
-def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) -> None:
-    """Under the name that was asked for, and as long as the log that was kept beside it."""
-    try:
-        probe()
-    except MissingError:
-        pytest.skip("no GL here")
-    log, film = out / "run.log", out / "film.mp4"
-    words = ["run", PAPER, "--units", "1000000", "--log", log, "--video", film, "-q"]
-    words += ["--size", "64x48", "--fps", "10"]
-    with started(*words, stderr=subprocess.PIPE) as process:
-        grown(film, 12_000, process)
-        process.send_signal(number)
-        process.communicate(timeout=60)
-    assert sorted(path.name for path in out.iterdir()) == ["film.mp4", "run.log"]
-    frames = len(iio.imread(film, plugin="pyav"))
-    assert frames > 20
-    assert abs(frames / 10 - read_log(log).time[-1]) < 2.0
 
 
 def test_a_film_that_is_stopped_in_its_first_frame_leaves_no_file(

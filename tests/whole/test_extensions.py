@@ -3,22 +3,15 @@ the line of the user's file."""
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import pytest
 
-import factory
-from factory.api import navigation
-from factory.pipeline import read
 from factory.support.extensions import extensions
 from tests.command_line import Terminal
-from tests.core.test_control_laws import SETTING
-from tests.paths import PAPER, ROOT
+from tests.paths import PAPER
 from tests.plug_in import FILES, write_package
 
 GOOD = '''"""The labels, one a line."""
@@ -35,39 +28,6 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "helper.py").write_text("x = 1\n")
     (tmp_path / "labels.py").write_text(GOOD)
     return tmp_path
-
-
-def listings() -> list[str]:
-    """The modules that the page about extensions shows."""
-    page = (ROOT / "docs" / "guide" / "extending.md").read_text("utf-8")
-    return re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
-
-
-def test_what_the_page_shows_runs_with_the_interface_alone() -> None:
-    exporter, law, app = listings()
-    lines = "\n".join((exporter, law, app)).splitlines()
-    loaded = {line for line in lines if "import" in line and "factory" in line}
-    assert loaded and all(line.startswith("from factory.api import ") for line in loaded)
-    spaces: list[dict[str, Any]] = [{}, {}, {}]
-    for listing, space in zip((exporter, law, app), spaces, strict=True):
-        exec(compile(listing, "extending.md", "exec", dont_inherit=True), space)
-    made = read(PAPER)
-    labels = spaces[0]["export"](SimpleNamespace(project=made)).split()
-    assert labels == [node.label for node in made.pag.nodes]
-    template, setting = made.templates["mate"], SETTING
-    plain, near = navigation(template, setting), spaces[1]["near"](template, setting)
-    assert near.eps == plain.eps / 2 and (near.goals == plain.goals).all()
-    ticks = spaces[2]["busy"](made, units=1)
-    assert len(ticks) == len(made.factory.net.threaded.places) and min(ticks) > 0
-
-
-def test_a_folder_brings_a_format(run: Terminal, folder: Path) -> None:
-    done = run("export", PAPER, "--format", "labels", "--exporters", folder)
-    assert done.status == 0, done.err
-    assert set(done.out.split()) == {n.label for n in factory.load_pag(PAPER).nodes}
-    assert factory.export(PAPER, "labels", exporters=[folder]) == done.out.rstrip("\n")
-    without = run("export", PAPER, "--format", "labels")
-    assert without.status == 2 and "unknown format 'labels'" in without.err
 
 
 MISTAKES = [
@@ -156,15 +116,6 @@ def test_the_line_of_success_names_what_was_written(run: Terminal, folder: Path)
     assert (folder / "d" / "b.txt").read_bytes() == b"y"
 
 
-def test_a_dash_is_standard_output(
-    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    words = "export", PAPER, "--format", "dot"
-    assert run(*words, "-o", "-").out == run(*words).out != ""
-    assert not Path("-").exists()
-
-
 def test_a_folder_that_is_not_there(run: Terminal, tmp_path: Path) -> None:
     done = run("export", PAPER, "--format", "dot", "--exporters", tmp_path / "no")
     assert done.status == 2
@@ -184,18 +135,6 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     extensions.cache_clear()
     for name in [name for name in sys.modules if name.partition(".")[0] == "gluing"]:
         del sys.modules[name]
-
-
-def test_a_package_brings_an_operation_a_law_a_robot_type_and_a_format(
-    run: Terminal, package: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "p.pag").write_text(FILES["p.pag"])
-    ran = run("run", tmp_path / "p.pag", "--json").json
-    assert ran["refines_net"] and ran["products"] == 1
-    assert run("export", tmp_path / "p.pag", "--format", "count").out.strip() == "2"
-    listed = run("templates", "--json").json
-    assert "dab" in {t["name"] for t in listed["templates"]}
-    assert {"name": "dabber", "extends": "tool"}.items() <= listed["robots"][-1].items()
 
 
 PACKAGE_MISTAKES = [

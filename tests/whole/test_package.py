@@ -9,7 +9,6 @@ import os
 import shutil
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -135,16 +134,6 @@ def test_every_stage_gives_the_same_run() -> None:
     assert all(run == runs[0] for run in runs)
 
 
-def test_a_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout = factory.lay_out(PAPER, clearance=0.03)
-    monkeypatch.setattr("factory.floor.layout.request.Ground.lay_out", None)
-    built = factory.build(layout)
-    assert built.model.settings.clearance == 0.03
-    assert factory.analyze(layout).timing.layout is layout
-    with pytest.raises(TypeError):
-        factory.build(layout.factory)  # the fault that is planted: this one is laid out
-
-
 def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
     assert run("build", PAPER, "-o", tmp_path / "command").status == 0
     built = factory.build(PAPER, tmp_path / "function")
@@ -159,28 +148,6 @@ def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
     assert again.events == factory.run(PAPER, units=2).events
 
 
-def test_an_export_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
-    for form in ("pnml", "svg", "st"):
-        text = factory.export(PAPER, form, tmp_path / form)
-        assert isinstance(text, str)
-        assert run("export", PAPER, "--format", form).out == text.rstrip("\n") + "\n"
-        assert (tmp_path / form).read_text() == text
-
-
-def test_a_log_serves_report_analysis_and_export(run: Terminal, tmp_path: Path) -> None:
-    log, told = tmp_path / "run.log", list[tuple[float, int]]()
-    made = factory.run(PAPER, units=4, log=log, progress=lambda *so_far: told.append(so_far))
-    assert told[-1] == (pytest.approx(made.sim_time_s), 4)
-    assert told == sorted(told)
-    page = factory.report(log, tmp_path / "page.html")
-    assert run("report", log, "-o", tmp_path / "same.html").status == 0
-    assert (tmp_path / "same.html").read_text() == page.text == (tmp_path / "page.html").read_text()
-    for measured in (made, log):
-        compared = factory.analyze(PAPER, measured=measured).measured
-        assert compared is not None and compared.cycle.measured == made.cycle_time_s
-    assert str(factory.export(log, "csv")).startswith("time_s,")
-
-
 def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
     source(tmp_path, PEG)
     made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=1)
@@ -191,23 +158,6 @@ def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> N
         factory.plan(tmp_path / "puzzle.pag", tmp_path / "none", replan=True)
     assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["CannotAssemble"]
     assert not (tmp_path / "none").exists()
-
-
-def test_a_layout_keeps_the_settings_and_the_ground_of_its_plan(tmp_path: Path) -> None:
-    """What a call does not choose is that of the plan.json, or of the layout."""
-    factory.build(PAPER, tmp_path, settings=factory.Settings(acceleration=1.5))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        layout = factory.lay_out(tmp_path / "plan.json")
-    kept = factory.build(tmp_path / "plan.json").model.settings
-    assert kept.acceleration == 1.5 and factory.lay_out(layout) is layout
-    wider = factory.lay_out(layout, clearance=0.03)
-    assert (wider.clearance, wider.hands[0]) == (0.03, layout.hands[0])
-
-
-def test_settings_replace_those_of_a_project() -> None:
-    slow = factory.Settings(speed=0.1)
-    assert factory.analyze(read(PAPER), settings=slow).timing.settings.speed == 0.1
 
 
 def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:

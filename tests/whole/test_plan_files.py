@@ -4,8 +4,6 @@ is looked for again."""
 from __future__ import annotations
 
 import json
-import random
-import shutil
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -13,15 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from factory.apps.analyze import Timing, analyse
 from factory.apps.few_robots.sharing import with_branches, with_lines
 from factory.apps.log.plan_file import plan_files, read_plan
-from factory.apps.report import page, recording_of
 from factory.engine.simulation.modelling import physical_model
-from factory.floor.layout import request
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.floor.layout.saved import LayoutTable
@@ -31,11 +25,6 @@ from factory.support.tables import table_of, value_of
 from factory.theory.problem.plan import Plan
 from tests.apps.relay.test_relay_hands import sawn
 from tests.command_line import Terminal
-from tests.layout_values import (
-    Drawn,
-    drawn_layouts,
-    random_layout,
-)
 from tests.paths import PAPER, ROOT, TESTS
 
 EXAMPLES = ROOT / "examples"
@@ -69,16 +58,6 @@ def with_text(text: str, folder: Path, **ground: Any) -> Project:
 
 
 # --- values and tables ----------------------------------------------------------------------------
-
-
-@settings(max_examples=10)
-@given(drawn_layouts)
-def test_a_layout_is_read_as_it_was_written(drawn: Drawn) -> None:
-    layout = random_layout(*drawn)
-    table = json.loads(json.dumps(table_of(LayoutTable.of(layout))))
-    made = value_of(LayoutTable, table).laid_out(layout.factory, layout.product, layout.factory)
-    assert made == layout
-    assert_same(made, layout)
 
 
 VARIANTS: dict[str, Callable[[Path], Project]] = {
@@ -135,69 +114,12 @@ def test_a_broken_table_has_its_lesson(key: str, value: Any, words: str) -> None
     assert words in str(error.value)
 
 
-@given(st.randoms(use_true_random=False))
-def test_no_table_gives_a_traceback(chance: random.Random) -> None:
-    """Whatever is put in place of whatever: the layout is refused, or is one that holds."""
-    project = written()
-    table = json.loads(json.dumps(table_of(LayoutTable.of(project.layout))))
-    for _ in range(chance.randint(1, 3)):
-        at: Any = table
-        while isinstance(at, dict | list) and at:
-            key = chance.choice([*at]) if isinstance(at, dict) else chance.randrange(len(at))
-            if not isinstance(at[key], dict | list) or not at[key] or chance.random() < 0.2:
-                values = (None, -1, 0, 1, 0.3, 10**9, "", "above", True, [], {}, at[key])
-                at[key] = chance.choice(values)
-                break
-            at = at[key]
-    try:
-        laid = value_of(LayoutTable, table)
-        layout = replace(project, laid=laid).layout
-    except (ValueError, InputError):
-        return
-    assert layout.certificate is not None and layout.certificate.holds
-
-
 @cache
 def written() -> Project:
     return read(EXAMPLES / "truck.pag")
 
 
 # --- logs -----------------------------------------------------------------------------------------
-
-
-def test_a_log_is_read_though_the_search_would_choose_otherwise(
-    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The monitor judges, the report shows and the run goes on as before: nothing is looked for."""
-    log, cut = tmp_path / "run.log", tmp_path / "cut.log"
-    words = ("--units", 3, "--log", log, "--floor", "3x2")
-    assert run("run", PAPER, *words).status == 0
-    judged, shown = run("monitor", log).out, page(recording_of(log))
-
-    def other(*_: object) -> Layout:
-        raise AssertionError("a layout is looked for")
-
-    monkeypatch.setattr(request.Ground, "lay_out", other)
-    assert run("monitor", log).out == judged
-    assert page(recording_of(log)) == shown and recording_of(log).layout is not None
-    cut.write_bytes(log.read_bytes()[: log.stat().st_size * 2 // 3])
-    assert run("run", "--resume", cut).status == 0
-    assert cut.read_bytes() == log.read_bytes()
-    assert run("export", log, "--format", "csv", "-o", tmp_path / "log.csv").status == 0
-
-
-def test_a_log_of_other_forms_has_all_operations_of_its_pag(run: Terminal, tmp_path: Path) -> None:
-    """Those too which no robot does any more, since a plan has others instead."""
-    (tmp_path / "ops").mkdir()
-    text = (ROOT / "templates" / "mate.op").read_text("utf-8")
-    (tmp_path / "ops" / "join.op").write_text(text.replace("mate =", "join ="), "utf-8")
-    pag, log = tmp_path / "p.pag", tmp_path / "run.log"
-    pag.write_text(PAPER.read_text("utf-8").replace("mate", "join"), "utf-8")
-    words = ("--templates", tmp_path / "ops", "--robots", 3, "--log", log)
-    assert run("run", pag, *words).status == 0
-    shutil.rmtree(tmp_path / "ops")
-    assert run("monitor", log).status == 0
-    assert recording_of(log).layout is not None
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -235,37 +157,6 @@ def test_a_plan_is_read_in_place_of_its_pag(name: str, tmp_path: Path) -> None:
     anew = plan.project(plan.settings, plan.ground, said.append)
     assert [d.code for d in said] == ["BadPlan"] and "laid out again" in said[0].message
     assert_same(anew.layout, project.layout)
-
-
-def test_every_command_takes_a_plan(
-    run: Terminal, built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where nothing is looked for, and no `factory.toml` is listened to."""
-    monkeypatch.setattr(request.Ground, "lay_out", None)
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "factory.toml").write_text('robots = 5\nspeed = 0.1\n[lines]\na = ["sub3"]\n')
-    plan = built / "plan.json"
-    out = tmp_path / "out"
-    out.mkdir()
-    for words in (
-        ("check", plan),
-        ("programs", plan),
-        ("analyze", plan),
-        ("build", plan, "-o", out / "again"),
-        ("run", plan, "--world", "ideal", "--units", 2),
-        ("run", plan, "--speed", 0.5, "--log", out / "run.log"),
-        ("report", out / "run.log", "-o", out / "report.html"),
-        ("render", plan, "-o", out / "still.png", "--size", "64x64"),
-        ("export", plan, "--format", "pnml", "-o", out / "net.pnml"),
-        ("export", plan, "--format", "dxf", "-o", out / "floor.dxf"),
-        ("sweep", plan, "--vary", "seed=0:2", "--world", "ideal", "-o", out / "a.db", "--jobs", 1),
-    ):
-        done = run(*words, "-q")
-        assert done.status == 0, (words, done.err)
-    for name in ("layout.json", "paper.svg", "paper.proof.json", "paper.programs.txt"):
-        assert (out / "again" / name).read_bytes() == (built / name).read_bytes()
-    assert len(run("check", plan, "--json").json["gears"]) == 3
-    assert read_plan(plan).settings.speed == 0.4
 
 
 def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path) -> None:
@@ -346,30 +237,6 @@ def written_paper() -> Project:
     return read(PAPER)
 
 
-def test_the_meshes_of_a_plan(run: Terminal, tmp_path: Path) -> None:
-    """They are read from the folder of the PAG, or from beside the plan; a mesh that has changed
-    is another layout's."""
-    import trimesh
-
-    folder, moved = tmp_path / "a", tmp_path / "b"
-    folder.mkdir()
-    trimesh.creation.box((0.04, 0.04, 0.04)).export(folder / "a.stl")
-    (folder / "p.pag").write_text(
-        'root = x; x = mate(a, b); a = atomic(mesh = "a.stl");'
-        " b = atomic(box = (0.03, 0.03, 0.03), pos = (0, 0, 0.035))"
-    )
-    assert run("build", folder / "p.pag", "-o", folder / "d", "-q").status == 0
-    shutil.copytree(folder / "d", moved)
-    shutil.copy(folder / "a.stl", moved)
-    shutil.rmtree(folder)
-    done = run("run", moved / "plan.json")
-    assert done.status == 0 and not done.err, done.err
-    trimesh.creation.box((0.04, 0.04, 0.05)).export(moved / "a.stl")
-    assert "other settings, meshes" in run("check", moved / "plan.json").err
-    (moved / "a.stl").unlink()
-    assert "BadMesh" in run("check", moved / "plan.json").err
-
-
 def _raise(table: list[list[dict[str, Any]]], rows: Sequence[tuple[int, int]]) -> None:
     for operation, slot in rows:
         table[operation][slot]["elevation"] += 0.002
@@ -394,41 +261,6 @@ def test_visits_that_are_refused(change: Callable[[Any], object], words: str) ->
     change(table["visits"])
     with pytest.raises(InputError, match=words):
         _ = replace(project, laid=value_of(LayoutTable, table, "layout")).layout
-
-
-def test_a_plan_with_one_change_is_another_plan_or_none(run: Terminal, tmp_path: Path) -> None:
-    """Of robots in turns, templates, forms: a diagnosis of the plan, whatever is changed."""
-    (tmp_path / "p.pag").write_text(
-        "root = s; s = mate(f, c); f = insert(a, b); a = atomic(); b = atomic(); c = atomic()"
-    )
-    project = read(tmp_path / "p.pag").with_plan(Plan(turns=((0, 1, 2, 3),)))
-    plan, (content,) = tmp_path / "plan.json", plan_files(project, tmp_path, None, False).values()
-    table = json.loads(content)
-    turns = [
-        [*turn[:at], robot, *turn[at + 1 :]]
-        for turn in ([0, 1, 2, 3], [0, 1, 2, 0], [0, 2, 1, 2])
-        for at in range(4)
-        for robot in (-1, 0, 1, 2, 3, 99)
-    ]
-    tables = [{**table, "plan": {"turns": [turn], "lifts": []}} for turn in turns]
-    for name in table["templates"]:
-        others = {key: text for key, text in table["templates"].items() if key != name}
-        tables.append({**table, "templates": {**others, "nope": table["templates"][name]}})
-        tables.append({**table, "templates": {**others, name: ""}})
-    refused = 0
-    for made in tables:
-        plan.write_text(json.dumps(made))
-        done = run("programs", plan, "--json")
-        refused += done.status
-        codes = {"BadPlan"} if made["templates"] == table["templates"] else {"BadPlan", "Syntax"}
-        assert done.status == 0 or {*done.codes} <= codes, (made["plan"], done.out)
-    assert refused > 20
-
-
-def test_a_plan_that_is_not_utf_8_is_told_as_a_pag_is(run: Terminal, tmp_path: Path) -> None:
-    (tmp_path / "plan.json").write_bytes(b'{"schema": "\xff"}')
-    (error,) = run("check", tmp_path / "plan.json", "--json").json["errors"]
-    assert error["message"] == "byte 0xff is not UTF-8 text" and error["col"] == 13
 
 
 def test_a_kept_layout_whose_machines_are_too_near_is_refused() -> None:

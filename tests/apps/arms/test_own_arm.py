@@ -9,12 +9,8 @@ import trimesh
 from factory.api import InputError
 from factory.apps.arms.body import Stand, standing
 from factory.apps.arms.certifying import uncertified
-from factory.apps.arms.ground import with_arm
 from factory.apps.arms.model import KINDS, ArmModel
 from factory.apps.arms.reach import ring_of
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
-from factory.pipeline import read
 from tests.arm_models import random_way, shipped
 
 OWN = """<mujoco model="own">
@@ -78,17 +74,6 @@ def own(tmp_path: Path) -> Path:
     path = tmp_path / "seven-axes.xml"
     path.write_text(OWN)
     return path
-
-
-def test_a_users_arm_makes_a_product(own: Path, tmp_path: Path) -> None:
-    (tmp_path / "box.pag").write_text(BOX)
-    layout = with_arm(read(tmp_path / "box.pag"), str(own)).layout
-    simulation = Simulation(layout, RunRequest(units=2, jitter=0.3))
-    run = simulation.run()
-    assert run.succeeded and run.physics is not None
-    assert run.physics.unintended_contacts == 0 and run.physics.handoff_gap_max_mm < 0.15
-    assert layout.factory.robots[1].type == "seven_axes"
-    assert simulation.model is not None and "seven_axes_0.stl" in simulation.model.files
 
 
 def test_what_a_file_leaves_out_of_contact_stays_so(own: Path) -> None:

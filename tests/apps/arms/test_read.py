@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from factory.api import InputError
-from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.read import MODELS, chain_of, read_chain
-from tests.arm_models import configurations, random_arm, shipped
 
 LIMITS = (
     '<custom><numeric name="speed" data="1 2"/><numeric name="acceleration" data="3 4"/></custom>'
@@ -78,20 +76,6 @@ def test_hints_say_what_would_be_valid() -> None:
     assert "fingers" in hint("is not one chain: joint 'finger' is not between base and tool")
 
 
-def test_the_same_arm_without_a_fault_is_read() -> None:
-    """In degrees, which the file does not say; limits beside the file come first."""
-    chain = chain_of(arm())
-    assert chain.joints == ("pan", "wrist") and not chain.slides.any()
-    assert chain.limits.high == pytest.approx([np.pi / 2] * 2)
-    assert chain.limits.speed.tolist() == [1.0, 2.0]
-    assert chain.limits.acceleration.tolist() == [3.0, 4.0]
-    assert np.isinf(chain.limits.torque).all()
-    assert chain.tool(np.zeros(2))[0] == pytest.approx([0.1, 0.0, 0.4])
-    other = chain_of(arm(), values={"speed": [5.0, 6.0]})
-    assert other.limits.speed.tolist() == [5.0, 6.0]
-    assert chain_of(arm(site='<site name="tip"/>'), tool="tip").joints == ("pan", "wrist")
-
-
 def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
     drives = (
         '<actuator><position joint="pan" kp="1" forcerange="-9 7"/>'
@@ -100,22 +84,6 @@ def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
     assert chain_of(arm(after=drives)).limits.torque.tolist() == [7.0, 6.0]
     weak = FIRST.replace("/>", ' actuatorfrcrange="-5 6"/>')
     assert chain_of(arm(first=weak, after=drives)).limits.torque.tolist() == [5.0, 6.0]
-
-
-def test_an_arm_on_a_pedestal_is_read_in_the_frame_of_its_base() -> None:
-    """What stands beside it is not the arm's, and its place does not matter."""
-    inside = arm().partition("<worldbody>")[2].partition("</worldbody>")[0]
-    places = 'pos="0 0 0"', 'pos="1 2 3" euler="0 30 70"'
-    chains = []
-    for place in places:
-        base = f'<body name="base" {place}><geom name="foot" size="0.1"/>{inside}</body>'
-        text = f'<geom name="floor" type="plane" size="1 1 1"/><geom name="wall" size="2"/>{base}'
-        chains.append(chain_of(f"<mujoco>{LIMITS}<worldbody>{text}</worldbody></mujoco>"))
-    one, other = chains
-    assert [body.name for body in one.bodies] == ["foot", "geom 4", "geom 5"]
-    q = configurations(one, 5, 0)
-    for value, same in zip(one.tool(q), other.tool(q), strict=True):
-        assert np.abs(value - same).max() < 1e-12
 
 
 def surface(m: mujoco.MjModel, geom: int, ways: np.ndarray) -> np.ndarray:
@@ -178,14 +146,6 @@ def test_bodies_contain_their_geoms_and_hardly_more() -> None:
     assert len(chain.bodies) == 8
 
 
-def test_what_is_only_shown_does_not_count_unless_nothing_else_is_there() -> None:
-    shown = '<geom name="shown" size="0.1" contype="0" conaffinity="0"/>'
-    text = arm(second=SECOND + shown)
-    assert "shown" not in [body.name for body in chain_of(text).bodies]
-    nothing = text.replace('<geom size="0.05"/>', '<geom size="0.05" contype="0" conaffinity="0"/>')
-    assert "shown" in [body.name for body in chain_of(nothing).bodies]
-
-
 @pytest.mark.parametrize("name", ["six", "scara"])
 def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
     """Each shown geom lies within the hull of what is solid of its link: nothing drawn sticks out
@@ -204,39 +164,6 @@ def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
     for body in bodies:
         assert (extents[body, False] <= extents[body, True] + 1e-9).all(), m.body(body).name
         assert (extents[body, False] >= extents[body, True] - 0.02).all()
-
-
-def test_the_shipped_arms_have_the_lengths_and_limits_they_are_said_to_have() -> None:
-    six, scara = shipped("six"), shipped("scara")
-    at, turn = six.tool(np.zeros(6))
-    assert at == pytest.approx([0.0, 0.133 + 0.1, 0.163 + 0.425 + 0.392 + 0.1])
-    assert turn[:, 2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-7)
-    assert six.limits.torque.tolist() == [150.0] * 3 + [28.0] * 3
-    assert six.limits.speed.tolist() == [2.0] * 6
-    assert scara.slides.tolist() == [False, False, True, False]
-    at, turn = scara.tool(np.array([0.0, 0.0, 0.1, 0.0]))
-    assert at == pytest.approx([0.5, 0.0, 0.1]) and turn[2, 2] == pytest.approx(-1.0)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_masses_are_those_of_the_file(seed: int) -> None:
-    """What a link weighs is there once, whatever bodies are fixed to it."""
-    text = random_arm(seed)
-    chain: SerialChain = chain_of(text)
-    m = mujoco.MjModel.from_xml_string(text)
-    moving = np.isin(np.arange(m.nbody), below(m, int(m.jnt_bodyid[0])))
-    assert chain.inertia.mass.sum() == pytest.approx(m.body_mass[moving].sum())
-    weight = m.body_mass * (1 - m.body_gravcomp)
-    assert chain.inertia.weight.sum() == pytest.approx(weight[moving].sum())
-
-
-def below(m: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hang on it."""
-    there = [root]
-    for body in range(root + 1, m.nbody):
-        if int(m.body_parentid[body]) in there:
-            there.append(body)
-    return there
 
 
 def test_a_file_is_read_where_it_is(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from factory.api import Array, Layout
 from factory.apps.arms.arming import from_one_side
 from factory.apps.arms.holds import facing_up, holds
 from factory.apps.arms.rises import BEND, Rise
-from tests.arm_cells import chains, project, run
+from tests.arm_cells import chains, project
 
 DRAWER = """root = chest;
 chest = mate ( case, drawer );
@@ -106,12 +106,3 @@ def test_what_comes_from_a_side_meets_nothing_on_its_way() -> None:
         least, most = boxes(layout, other, np.zeros(3))
         apart = np.maximum(low - most, least - high).max(axis=1)
         assert apart.min() > 1e-4
-
-
-def test_a_cell_brings_a_part_from_a_side() -> None:
-    made = run(drawer(), units=2, jitter=0.3, seed=5)
-    assert made.succeeded and made.refines_net and made.products == 2
-    physics = made.physics
-    assert physics is not None and physics.unintended_contacts == 0
-    assert 0.0 < physics.handoff_gap_max_mm <= 0.1
-    assert physics.product_error_max_mm is not None and physics.product_error_max_mm <= 0.01

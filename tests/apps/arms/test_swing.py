@@ -6,48 +6,15 @@ from dataclasses import replace
 from unittest.mock import patch
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 from factory.apps.arms import laying
 from factory.apps.arms.orders import PrivateParts, private_parts
-from factory.apps.arms.reach import circle_of
 from factory.apps.arms.scene import Scene
-from tests.arm_cells import SMALL, cell, chains, project, refusal, run
-from tests.arm_models import shipped
+from tests.arm_cells import SMALL, chains, project, refusal
 from tests.paths import EXAMPLES, ROOT
 
 SWING = str(EXAMPLES / "cells" / "swing.xml")
-
-RADIUS = 0.28
-"""Of its circle [m]."""
-
-
-def test_the_carrier_stands_where_the_circle_crosses_its_line() -> None:
-    """For each part elsewhere, and the tool takes and places all on the circle."""
-    layout = cell(SWING)
-    assert circle_of(chains(layout).model.chain) == pytest.approx(RADIUS)
-    assert circle_of(shipped("scara")) is None
-    joins = [o for o in layout.factory.making if len(o.inputs) == 2]
-    stops = [layout.visits[o.index, o.carrier].at for o in joins]
-    assert abs(stops[1] - stops[0]) > 0.003
-    for leg in chains(layout).curves.legs:
-        places, _ = leg.chain.tool(leg.way.at(np.array([0.0, leg.way.length]))[0])
-        assert np.hypot(*places[:, :2].T) == pytest.approx(RADIUS, abs=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("arm", "units"),
-    [(SWING, 3), *(pytest.param(f"{SWING}{n}", 20, marks=pytest.mark.slow) for n in ("", "=2"))],
-)
-def test_it_makes_products(arm: str, units: int) -> None:
-    made = run(cell(arm), units=units, jitter=0.3, seed=5)
-    assert made.succeeded and made.refines_net and made.products == units
-    physics = made.physics
-    assert physics is not None and physics.unintended_contacts == 0 and physics.pairs > 0
-    assert 0.0 < physics.handoff_gap_max_mm <= 0.05
-    if made.cycle_time_s:
-        assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
 
 
 def test_ways_are_planned_round_the_pile_where_the_carrier_stands() -> None:
@@ -80,14 +47,6 @@ def test_the_carrier_goes_on_when_an_arm_is_up() -> None:
 def soon(private: dict[str, PrivateParts]) -> dict[str, PrivateParts]:
     """The same, but for arms that are clear of each other as they leave."""
     return {label: replace(part, leaves=0.0) for label, part in private.items()}
-
-
-def test_where_it_is_on_its_legs_is_found_though_they_cross() -> None:
-    """The nearest of some places on each leg may lie on another than the arm is on."""
-    sought, rng = chains(cell(SWING)).sought, np.random.default_rng(1)
-    for leg in sought.legs[0]:
-        for x in rng.uniform(0.0, leg.way.length, (400, 1)):
-            assert sought.apart(leg.way.at(x)[0])[0] < 1e-6
 
 
 def test_the_page_shows_its_joints() -> None:

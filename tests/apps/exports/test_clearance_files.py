@@ -28,10 +28,6 @@ from tests.paths import ROOT
 
 Json = Any
 
-QUICK = ("paper", "stool", "shelf", "lamp")
-"""Examples that are laid out in a few seconds."""
-
-EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
 
 MUTANTS = 12
 """So many documents are changed at one place."""
@@ -46,14 +42,6 @@ def built(name: str) -> Path:
     project = read(ROOT / "examples" / f"{name}.pag")
     build(project, proved(project.layout.factory.net), BuildRequest(output=folder))
     return folder
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n not in QUICK)) for n in EXAMPLES]
-)
-def test_what_is_built_is_proved(name: str) -> None:
-    proof = read_folder(built(name))
-    assert proof.excluded and faults_of(proof) == []
 
 
 def test_the_checker_knows_nothing_of_layouts() -> None:

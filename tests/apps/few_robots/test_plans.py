@@ -102,11 +102,6 @@ def check(seed: int, folder: Path) -> None:
     assert (anew.guidepaths, anew.visits) == (layout.guidepaths, layout.visits)
 
 
-@pytest.mark.parametrize("seed", FEW)
-def test_any_plan_of_any_product(seed: int, tmp_path: Path) -> None:
-    check(seed, tmp_path)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", MANY)
 def test_a_thousand_plans(seed: int, tmp_path: Path) -> None:

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
-from factory.apps.fidelity.hidden import HiddenPenetrations, overlaps_of
-from factory.apps.fidelity.solid import drawn
-from factory.engine.record.state import State
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
+from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.support.engine import mujoco
-from tests.command_line import Terminal
-from tests.pag_texts import laid_out
-from tests.paths import PAPER
-from tests.whole.test_insets import PRESSED
 
 MASKS = 'contype="0" conaffinity="0"'
 EXCLUDE = '<exclude body1="r1/head" body2="part/a#1"/>'
@@ -53,11 +44,6 @@ def told(
     return {p.geoms: (pytest.approx(p.depth_mm, abs=1e-3), p.moves) for p in hidden.found()}
 
 
-def test_what_is_apart_or_touches_is_not_inside() -> None:
-    """Nor is what is fixed to each other, and what is below the floor."""
-    assert told() == told(rail=0.02) == told(x=0.23) == {}
-
-
 @pytest.mark.parametrize("mm", [0.2, 1.0])
 def test_a_planted_overlap_is_seen_whatever_the_masks_are(mm: float) -> None:
     """A part's pieces count, and not what is drawn in their place."""
@@ -65,12 +51,6 @@ def test_a_planted_overlap_is_seen_whatever_the_masks_are(mm: float) -> None:
         for exclude in ("", EXCLUDE):
             found = told(0.23 - mm * 1e-3, masks=masks, exclude=exclude)
             assert found == {("part/a#1/1", "r1/plate"): (mm, True)}
-
-
-def test_what_slides_on_its_own_rail_or_robot_and_what_stands_is_seen() -> None:
-    assert told(head=0.0395) == {("r1/carriage", "r1/plate"): (0.5, True)}
-    assert told(height=0.027) == {("r1/carriage", "r1/rail"): (1.0, True)}
-    assert told(rail=0.0195) == {("r1/rail", "r2/rail"): (0.5, False)}
 
 
 def test_the_deepest_of_all_times_and_copies_is_kept() -> None:
@@ -89,53 +69,3 @@ def test_the_deepest_of_all_times_and_copies_is_kept() -> None:
     assert (found.geoms, found.time_s) == (("part/b#1", "part/b#2"), 0.1)
     assert found.depth_mm == hidden.deepest() == pytest.approx(90, abs=0.01)
     assert str(found) == "90.000 mm: part/b#1 - part/b#2, at 0.10 s"
-
-
-def test_parts_count_by_what_they_are_deeper_than_in_the_product() -> None:
-    layout = laid_out(PRESSED)
-    assert overlaps_of(layout) == {("a", "b"): pytest.approx(0.3e-3)}
-    simulation = Simulation(layout, RunRequest(units=2, seed=1, jitter=0.3))
-    less, whole = HiddenPenetrations.of(simulation), HiddenPenetrations.of(simulation)
-    whole = HiddenPenetrations(whole.replica.m, {})
-
-    def look(_: State) -> None:
-        for hidden in (less, whole):
-            hidden.look(simulation.physical.d.qpos, simulation.world.time)
-
-    simulation.run([look])
-    deep = [
-        max(
-            (p.depth_mm for p in hidden.found() if "part/a#" in str(p) and "part/b#" in str(p)),
-            default=0.0,
-        )
-        for hidden in (less, whole)
-    ]
-    assert deep[0] < 0.02
-    assert deep[1] == pytest.approx(0.3, abs=0.02)
-
-
-def test_all_that_is_drawn_is_solid() -> None:
-    simulation = Simulation(laid_out(PAPER.read_text()), RunRequest())
-    m = simulation.physical.m
-    solid = {m.geom(int(i)).name for i in np.flatnonzero(drawn(m))}
-    assert {"r1/number", "r2/rail", "outfeed/roof", "feeder/part1/boom", "part/part1#1"} <= solid
-    assert not {"floor", "ground", "compass/1"} & solid
-
-
-def test_a_seed_lists_its_worst_penetrations_and_the_command_tells_them(run: Terminal) -> None:
-    words = (PAPER, "--seeds", 1, "--units", 1, "--jobs", 1)
-    done, key = run("fidelity", *words, "--json"), "hidden_penetration_max_mm"
-    (seed,) = done.json["seeds"]
-    listed = seed["hidden_penetrations"]
-    assert done.json["figures"][key]["worst"] == max((p["depth_mm"] for p in listed), default=0)
-    told = run("fidelity", *words, "-v")
-    assert key in told.out
-    for penetration in listed:
-        assert " - ".join(penetration["geoms"]) in told.out
-
-
-def test_a_magazine_of_a_line_is_solid(run: Terminal) -> None:
-    words = (PAPER, "--robots", 3, "--seeds", 1, "--units", 2, "--jobs", 1)
-    done = run("fidelity", *words, "--json")
-    assert done.status == 0, done.err
-    assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1

@@ -6,31 +6,25 @@ import json
 import re
 import signal
 import socket
-import sys
 from collections.abc import Iterator
 from dataclasses import fields
 from http.client import HTTPConnection
 from subprocess import PIPE
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 from factory.apps.live import Server, Session
 from factory.apps.live.commands import FAULTS, KEYS, Command, command_of
-from factory.apps.live.interventions import Interventions
-from factory.apps.live.page import page, stage_of
-from factory.apps.monitor import beside
-from factory.apps.report.drawings import floor_plan, labels_of
-from factory.engine.record.state import State
+from factory.apps.live.page import page
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.theory.nets.replay import replay
 from tests.command_line import Terminal, started
 from tests.layout_values import paper_layout
-from tests.live_sessions import Running, a_session
+from tests.live_sessions import Running
 from tests.paths import PAPER
 
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
@@ -90,61 +84,6 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
 # --- interventions ------------------------------------------------------------------------------
 
 
-def moved(share: float) -> float:
-    """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
-    simulation = Simulation(paper_layout(), RunRequest(units=10))
-    interventions, world = Interventions(simulation), simulation.physical
-    interventions.block("part1")
-    slide = world.motion.axes.qpos[0]
-    start = float(world.d.qpos[slide])
-    found = [0.0]
-    for tick in range(100):
-        if tick == 10:
-            interventions.push(0, share, 0.3)
-        simulation.supervisor.step()
-        found.append(float(world.d.qpos[slide]) - start)
-    assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
-    push = interventions.pushed
-    assert push is not None and push.robot == 0
-    assert push.force == share * world.m.actuator_forcerange[world.motion.axes.actuator[0], 1]
-    assert push.gave == pytest.approx(abs(max(found, key=abs)), rel=0.1)
-    return max(found, key=abs)
-
-
-def test_a_pushed_robot_gives_way_and_comes_back() -> None:
-    """Robots wait at their B ends, and A, where they deliver, is 0."""
-    assert moved(1.0) < 2 * moved(0.5) < 0 < moved(-1.0)
-
-
-@pytest.mark.parametrize("pushed", [False, True])
-def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
-    """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
-    and makes its products. Without pushes, which the monitor cannot tell from faults, the monitor
-    agrees."""
-    simulation = Simulation(paper_layout(), RunRequest(units=12))
-    interventions, watcher = Interventions(simulation), beside(simulation)
-    draw, ticks = np.random.default_rng(5), 0
-
-    def act(state: State) -> None:
-        nonlocal ticks
-        ticks += 1
-        watcher.observe(state)
-        if ticks > 2500:
-            for part in PARTS:
-                interventions.free(part)
-        elif ticks % 40 == 0:
-            robot, part = int(draw.integers(6)), PARTS[draw.integers(3)]
-            if pushed:
-                interventions.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
-            interventions.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
-            (interventions.block if draw.random() < 0.5 else interventions.free)(part)
-
-    run = simulation.run([act])
-    assert run.products == 12 and run.trouble is None and run.refines_net
-    assert pushed or watcher.report().refines_net, watcher.report().violations[:3]
-    assert run.physics is not None and run.physics.product_error_max_mm < 0.1
-
-
 # --- a session ---------------------------------------------------------------------------------
 
 
@@ -177,12 +116,6 @@ def test_pause_step_and_play(running: Running) -> None:
     running.until(lambda f: f.time > after.time + 0.2)
 
 
-def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
-    for speed in (1.0, 2.0, 0.25):
-        running.session.send(Command("speed", factor=speed))
-        running.until(lambda f, s=speed: f.speed == s and f.pace == pytest.approx(s, rel=0.25))
-
-
 def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> None:
     send = running.session.send
     send(Command("speed", factor=0.0))
@@ -196,18 +129,6 @@ def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> 
     assert running.until(lambda f: f.time > quiet.time + 1).count == quiet.count
     send(Command("block", part="part2", blocked=False))
     running.until(lambda f: f.products > quiet.products + 1 and not f.note)
-
-
-def test_restart(running: Running) -> None:
-    send = running.session.send
-    send(Command("speed", factor=0.0))
-    send(Command("slow", robot=2, factor=0.5))
-    before = running.until(lambda f: f.count > 20 and f.slowed == {2: 0.5})
-    send(Command("pause"))
-    send(Command("restart"))
-    fresh = running.until(lambda f: f.run == 1)
-    assert (fresh.time, fresh.count, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
-    assert running.session.fired(before.run, 0, 5) == []
 
 
 def test_it_says_when_the_engine_gives_up(running: Running) -> None:
@@ -252,16 +173,6 @@ def unpacked(message: bytes) -> tuple[dict[str, Any], np.ndarray]:
     return json.loads(message[4 : 4 + length]), np.frombuffer(message[4 + length :], "<f4")
 
 
-def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
-    status, body, headers = asked(server, path_of(server))
-    assert (status, body) == (200, "<p>the page")
-    assert headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
-    for path in ("/", "/live", "/../etc/passwd", path_of(server)[:-2] + "x/", "/" + "x" * 500):
-        assert asked(server, path)[0] == 404
-    with Server(a_session(True), b"") as other:
-        assert path_of(other) != path_of(server)
-
-
 def test_other_names_and_other_pages_are_refused(server: Server) -> None:
     """A page of another origin whose name resolves to this machine, and one with the address."""
     assert asked(server, path_of(server), Host="evil.example:80")[0] == 403
@@ -304,17 +215,6 @@ def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) ->
     running.until(lambda f, n=running.session.frame.number: f.number > n)
 
 
-def test_every_firing_is_told_once(server: Server, running: Running) -> None:
-    with socket_of(server) as watcher:
-        running.session.send(Command("speed", factor=0.0))
-        told: list[tuple[float, int]] = []
-        while len(told) < 150:
-            frame, _ = unpacked(watcher.recv(10))
-            told += map(tuple, frame["fired"])
-            assert len(told) == frame["count"]
-    assert told == running.session.fired(0, 0, len(told))
-
-
 def test_it_listens_on_loopback_only(running: Running) -> None:
     for host in ("0.0.0.0", "::", "192.0.2.1", "example.org"):
         with pytest.raises(InputError, match="other machines"):
@@ -341,18 +241,6 @@ def test_the_page_names_every_robot_and_part(running: Running) -> None:
     assert data["parts"] == [o.label for o in paper_layout().factory.leaves]
     assert len(data["frames"]["reach"][0]) == len(data["frames"]["moving"])
     assert "connect-src 'self'" in made and 'class="station"' in made
-
-
-def test_robots_are_drawn_in_one_piece() -> None:
-    """A carriage is 60 mm wide; the finger is on its arm."""
-    layout = paper_layout()
-    drawn = floor_plan(stage_of(Simulation(layout)), labels_of(layout.factory))
-    groups = next(g for g in ElementTree.fromstring(drawn) if g.get("class") == "robots")
-    for path, group in zip(layout.guidepaths, groups, strict=True):
-        for shape in group:
-            corners = [tuple(map(float, p.split(","))) for p in shape.get("points", "").split()]
-            assert len(corners) >= 4
-            assert max(np.hypot(x, y) for x, y in corners) <= 1e3 * path.reach + 31
 
 
 def test_a_push_answers() -> None:
@@ -396,14 +284,6 @@ def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch)
     done = run("view", PAPER, "--host", "0.0.0.0", "--json")
     assert done.status == 2 and done.codes == ["BadValue"]
     assert "--expose" in done.json["errors"][0]["hint"]
-
-
-def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("factory.pipeline.read", None)
-    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
-    done = run("view", PAPER, "--json")
-    assert done.status == 3 and done.codes == ["Missing"]
-    assert done.json["errors"][0]["hint"] == "pip install 'klavins-factory[live]'"
 
 
 def test_every_key_of_a_command_is_checked() -> None:

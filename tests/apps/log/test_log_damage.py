@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,9 @@ import pytest
 
 from factory.apps.log import MAGIC, LogWriter, read_log
 from factory.apps.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
-from factory.apps.log.checks import LogHeader
 from factory.apps.log.model import model_of
 from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from factory.support.tables import misfit
 from tests.command_line import Terminal
 from tests.layout_values import paper_layout
 from tests.paths import PAPER
@@ -154,18 +152,6 @@ def test_headers_of_other_factories(
     assert tried(bad)[0] == 2
 
 
-OPTIONAL = {"faults", "demand", "layout", "cell"}
-"""Keys that a header may lack; a layout or a cell it has."""
-
-
-def test_a_header_that_lacks_a_key(log: Path, tmp_path: Path) -> None:
-    header, blocks = taken_apart(log)
-    bad = tmp_path / "bad.log"
-    for key in {field.name for field in fields(LogHeader)} - OPTIONAL:
-        rest = {name: value for name, value in header.items() if name != key}
-        assert is_refused(put_together(bad, rest, blocks), f"'{key}'")
-
-
 def longer(values: np.ndarray) -> np.ndarray:
     return np.concatenate([values, values[-1:]])
 
@@ -220,20 +206,6 @@ def test_a_block_that_lacks_an_array(log: Path, tmp_path: Path, name: str) -> No
     header, blocks = taken_apart(log)
     found = [(kind, {n: a for n, a in arrays.items() if n != name}) for kind, arrays in blocks]
     assert is_refused(put_together(tmp_path / "bad.log", header, found), f"it has no '{name}'")
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        IndexError("index 5 is out of bounds for axis 0 with size 3"),
-        UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"),
-        TypeError("'NoneType' object is not subscriptable"),
-        OverflowError("cannot convert float infinity to integer"),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-def test_what_python_says_of_values_that_do_not_fit_is_not_said(error: Exception) -> None:
-    assert misfit(error) == "its values do not fit each other"
 
 
 @pytest.mark.parametrize("value", [-1, 10**6])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from factory.apps.deviations import Campaign, Deviation
@@ -30,19 +29,6 @@ def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     return failing(tmp_path_factory.mktemp("failing") / "log", units=8, campaign=request.param)
 
 
-def test_states_between_failures_are_judged(log: Log) -> None:
-    report, subject = watch_log(log)
-    assert report.violations == () and verdict_on(log, subject.factory, report).succeeded
-    assert report.calm_s is not None and 1.0 < report.calm_s < log.time[-1]
-    assert len(report.seen) > 10
-    assert report.as_json()["judged_s"] == round(report.calm_s, 6)
-    for firing in report.seen:  # counted as in the whole run
-        times = [t for t, name in log.events if name == firing.transition]
-        (t,) = (t for t in times if firing.earliest - 1e-6 <= t <= firing.latest + 1e-6)
-        undone = [name for _, u in log.undone if u.t < t for name in u.transitions]
-        assert firing.unit == times.index(t) - undone.count(firing.transition)
-
-
 def test_spells_have_no_failure(log: Log) -> None:
     assert log.failures is not None
     factory = recorded_subject(log.header).factory
@@ -52,37 +38,6 @@ def test_spells_have_no_failure(log: Log) -> None:
         assert not any(begin <= one.t <= end for one in log.failures.found)
         assert not any(begin <= undone.t <= end for _, undone in log.undone)
         last = end
-
-
-def longest(log: Log) -> tuple[int, int]:
-    """The rows of the longest spell."""
-    factory = recorded_subject(log.header).factory
-    begin, end = max(spells(log, factory, model_of(log)), key=lambda span: span[1] - span[0])
-    return log.row_at(begin), log.row_at(end)
-
-
-def test_a_robot_that_is_elsewhere_is_blamed(log: Log) -> None:
-    """Planted: for half a second a part is away from the hand that holds it."""
-    first, last = longest(log)
-    qpos, middle = np.array(log.qpos), (first + last) // 2
-    m = model_of(log)
-    held = log.active[middle]
-    body = next(b for b in held[:, 2].tolist() if m.body(b).name == "part/part3#1")
-    address = m.jnt_qposadr[m.body_jntadr[body]]
-    qpos[middle : middle + 50, address + 2] += 0.05
-    report, _ = watch_log(replace(log, qpos=qpos))
-    assert "Dropped" in {violation.code for violation in report.violations}
-
-
-def test_a_firing_that_is_not_recorded_is_blamed(log: Log) -> None:
-    first, last = longest(log)
-    begin, end = float(log.time[first]), float(log.time[last - 1])
-    ends = [n for n, (t, name) in enumerate(log.events) if begin < t < end and name == "part3_e"]
-    kept = np.delete(np.arange(len(log.fired)), ends[0])
-    undone = tuple((after - (after > ends[0]), one) for after, one in log.undone)
-    bad = replace(log, fired=log.fired[kept], fired_t=log.fired_t[kept], undone=undone)
-    report, _ = watch_log(bad)
-    assert "Record" in {violation.code for violation in report.violations}
 
 
 @pytest.mark.parametrize("change", ["more", "less", "other"])

@@ -16,10 +16,8 @@ from factory.apps.planning.source import SourceOptions, read_source
 from factory.pipeline import all_templates
 from factory.support.errors import InputError
 from tests.command_line import Terminal
-from tests.paths import ROOT
 
 TEMPLATES = all_templates(())
-CASES = ROOT.parent / "shared" / "cases"
 Parts = Mapping[str, trimesh.Trimesh]
 
 
@@ -67,23 +65,6 @@ def peg(thicker: float, width: float = 40.0) -> dict[str, trimesh.Trimesh]:
     return {"frame": frame, "peg": block((-side, -side, -30), (side, side, 40))}
 
 
-@pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")
-def test_parts_about_their_own_origins_are_refused(run: Terminal, tmp_path: Path) -> None:
-    words = ("plan", CASES / "all_at_origin", "-o", tmp_path / "out", "--no-look")
-    done = run(*words, "--json")
-    assert (done.status, done.codes) == (2, ["NotInPlace"])
-    assert "100% of 'lid' is in 'housing'" in done.json["errors"][0]["message"]
-    assert not (tmp_path / "out").exists()
-    again = run(*words, "--in-place", "--json")
-    assert again.status == 0 or "NotInPlace" not in again.codes
-
-
-@pytest.mark.parametrize("thicker", [0.0, 0.4, 0.8])
-@pytest.mark.parametrize("width", [8.0, 40.0])
-def test_a_press_fit_is_in_place(tmp_path: Path, thicker: float, width: float) -> None:
-    assert len(read(tmp_path, peg(thicker, width)).parts) == 2
-
-
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
@@ -102,44 +83,6 @@ def test_parts_one_inside_another_are_refused(tmp_path: Path, parts: Parts, word
     code, message = refused(tmp_path, parts, unit="mm")
     assert code == "NotInPlace"
     assert "a pair of parts overlaps" in message and words in message
-
-
-def moved(parts: Parts, factor: float, flat: bool = False) -> dict[str, trimesh.Trimesh]:
-    """Parts drawn apart by a factor; `flat`: side by side on a print bed."""
-    middle, found, at = parts["seat"].centroid, {}, 0.0
-    for name, mesh in parts.items():
-        shift = (mesh.centroid - middle) * factor
-        if flat:
-            shift, at = np.array([at, 0, 0]) - mesh.bounds[0], at + np.ptp(mesh.bounds[:, 0]) + 5
-        found[name] = mesh.copy().apply_translation(shift)
-    return found
-
-
-@pytest.mark.parametrize(
-    "parts",
-    [
-        moved(stool(), 0.3),
-        moved(stool(), 0.0, flat=True),
-        {**stool(), "knob": block((140, 140, 460), (160, 160, 480))},
-    ],
-    ids=["exploded", "bed", "floating"],
-)
-def test_groups_that_touch_nothing_are_refused(tmp_path: Path, parts: Parts) -> None:
-    code, message = refused(tmp_path, parts)
-    assert code == "NotInPlace"
-    assert "groups that do not touch each other" in message
-
-
-def test_a_folder_gives_the_product_its_whole_name(tmp_path: Path) -> None:
-    folder_of(tmp_path / "stool_0.4m tall", stool())
-    assert read_source(tmp_path / "stool_0.4m tall", TEMPLATES).name == "stool_0.4m-tall"
-
-
-def test_parts_with_some_play_touch(tmp_path: Path) -> None:
-    parts = stool()
-    parts["seat"].apply_translation((0, 0, 0.8))
-    assert len(read(tmp_path, parts).parts) == 4
-    assert len(read_source(tmp_path / "parts", TEMPLATES, SourceOptions("cm")).parts) == 4
 
 
 def test_a_sheet_of_two_sides_is_said_to_bound_nothing(run: Terminal, tmp_path: Path) -> None:
@@ -172,12 +115,6 @@ def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, scale: float) -> No
     assert max(p.solid.high[2] for p in source.parts) == pytest.approx(0.0254 * length, rel=1e-4)
 
 
-@pytest.mark.parametrize(("scale", "unit"), [(1.0, "mm"), (0.001, "m"), (0.2, "mm")])
-def test_a_unit_that_is_clear_is_taken_and_said(tmp_path: Path, scale: float, unit: str) -> None:
-    source = read(tmp_path, stool(), scale)
-    assert any(f"lengths are taken as {unit}: the files state no unit" in n for n in source.notes)
-
-
 @pytest.mark.parametrize(
     ("name", "scale", "answer", "status"),
     [("unit", 0.01, "in\n", 0), ("place", 1.0, "y\n", 0), ("no", 1.0, "n\n", 2)],
@@ -200,13 +137,3 @@ def test_on_a_terminal_the_user_is_asked(
     asked = "unit of lengths" if name == "unit" else "plan them where they are?"
     assert asked in done.err
     assert (tmp_path / "out").exists() == (status == 0)
-
-
-def test_links_of_a_chain_that_do_not_touch_are_in_place(tmp_path: Path) -> None:
-    """One reaches into the other: no print bed and no exploded display looks so."""
-    ring = trimesh.creation.torus(15.0, 3.0, major_sections=24, minor_sections=12)
-    other = ring.copy().apply_transform(
-        trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])
-    )
-    other.apply_translation([15.0, 0.0, 0.0])
-    assert len(read(tmp_path, {"one": ring, "other": other}).parts) == 2

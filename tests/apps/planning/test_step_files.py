@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.apps.importing.scene_file import FINE, SHARE, read_step
 from factory.apps.planning.source import read_source
 from factory.floor.geometry.meshes import volume_of
 from factory.pipeline import all_templates
@@ -21,10 +20,8 @@ pytest.importorskip("cascadio")
 
 TEMPLATES = all_templates(())
 DATA = ROOT / "tests" / "data" / "step"
-CASES = ROOT.parent / "shared" / "cases"
 
 RED, BLUE, GREEN, GREY = (1.0, 0.0, 0.0), (0.2, 0.4, 0.8), (0.1, 0.7, 0.2), (0.5, 0.5, 0.5)
-PURE = (0.0, 1.0, 0.0)
 Part = tuple[tuple[float, ...], float | None, Vector | None]
 """A part as drawn: its box, low and high [mm], its volume [mm³], None where it is that of the box,
 and its colour, None for none."""
@@ -70,18 +67,6 @@ FILES: Mapping[str, Mapping[str, Part]] = {
 }
 """What OpenCASCADE was told to write."""
 
-SOLVESPACE: Mapping[str, Mapping[str, Part]] = {
-    "solvespace_pin_in_plate": {
-        "Product-1": ((0, 0, 0, 40, 30, 10), 12000 - np.pi * 6.05**2 * 10, RED),
-        "Product-2": ((14, 9, 0, 26, 21, 25), np.pi * 36 * 25, PURE),
-    },
-    "solvespace_three_in_a_row": {
-        "Product-1": ((0, 0, 0, 20, 20, 10), None, (0.0, 0.0, 1.0)),
-        "Product-2": ((20.01, 0, 0, 40, 20, 20), None, PURE),
-        "Product-3": ((40.01, 0, 0, 60, 20, 30), None, RED),
-    },
-}
-"""What SolveSpace was told to write: one shell, in which each face has edges of its own."""
 
 LOWER, UPPER = ((0, 0, 0), (40, 40, 20)), ((0, 0, 20), (40, 40, 30))
 BESIDE: Box = ((40, 0, 0), (80, 40, 20))
@@ -192,47 +177,11 @@ def test_what_opencascade_wrote_is_read_as_it_was_drawn(name: str) -> None:
 
 
 @pytest.mark.usefixtures("steps")
-@pytest.mark.parametrize("name", SOLVESPACE)
-def test_what_solvespace_wrote_is_read_as_it_was_drawn(name: str) -> None:
-    assert_read(DATA / f"{name}.step", SOLVESPACE[name])
-
-
-@pytest.mark.usefixtures("steps")
 @pytest.mark.parametrize("name", OWN)
 def test_what_another_writer_wrote_is_read_as_it_was_drawn(tmp_path: Path, name: str) -> None:
     text, drawn = OWN[name]
     (tmp_path / "a.step").write_text(text)
     assert_read(tmp_path / "a.step", drawn)
-
-
-@pytest.mark.usefixtures("steps")
-@pytest.mark.parametrize(("prefix", "larger"), [(".CENTI.", 10), (".DECI.", 100)])
-def test_a_large_component_has_no_finer_facets_than_its_size_asks_for(
-    prefix: str, larger: int
-) -> None:
-    """The same assembly in larger units: as fine as before, it would have `larger` ** 0.5 times the
-    triangles."""
-    text = (DATA / "nested_assembly.step").read_text()
-    metres = text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({prefix},.METRE.)")
-    small, large = (read_step(content.encode()) for content in (text, metres))
-    for body, scaled in zip(small, large, strict=True):
-        (vertices, faces), (corners, triangles) = body.bodies[0], scaled.bodies[0]
-        assert np.ptp(corners, axis=0) == pytest.approx(larger * np.ptp(vertices, axis=0), rel=1e-2)
-        assert len(triangles) < 0.7 * larger**0.5 * len(faces) or len(faces) == 12
-        if "pin" in body.names[0]:
-            height = float(np.ptp(corners[:, 2]))
-            sides = len(np.unique(np.round(corners[:, :2], 6), axis=0))
-            sagitta = 4.9e-3 * larger * (1 - np.cos(np.pi / sides))
-            assert sagitta <= max(1e-3 * FINE, SHARE * height)
-
-
-@pytest.mark.usefixtures("steps")
-@pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")
-@pytest.mark.parametrize(
-    ("name", "parts"), [("step_face_colour", 2), ("step_two_bodies_in_one_component", 3)]
-)
-def test_the_shared_files_are_read(name: str, parts: int) -> None:
-    assert len(read_source(CASES / f"{name}.step", TEMPLATES).parts) == parts
 
 
 @pytest.mark.parametrize(

@@ -10,16 +10,12 @@ import pytest
 
 from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import Recovery, recover
-from factory.apps.recovery.recovery import summed
-from factory.engine.record.failures import Failing
 from factory.engine.record.state import State
-from factory.engine.simulation.mujoco.feeders import Feeders
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import read
-from factory.theory.nets.undone import Undone
 from tests.paths import PAPER, ROOT
 
 WORLDS = "ideal", "mujoco"
@@ -76,84 +72,11 @@ STANDS = Deviation("down", robot="r5", at=0.0, seconds=12.0)
 """For longer than a robot that is not dead may be late."""
 
 
-@pytest.mark.parametrize("world", WORLDS)
-@pytest.mark.parametrize(
-    ("responses", "response", "undone"),
-    [
-        ("again 1 then stop", "again", {"sub1_s"}),
-        ("scrap", "scrap", {"sub1_s", "part1_s", "part1_e", "part2_s", "part2_e"}),
-    ],
-)
-def test_what_is_stuck_is_done_again_or_scrapped(
-    tmp_path: Path, world: WorldName, responses: str, response: str, undone: set[str]
-) -> None:
-    """The robot moves again while it is to go back, so it is not taken for dead."""
-    layout = laid_out(tmp_path, "mate", f"jammed : {responses}, lost : scrap")
-    run, recovery = stopped(layout, world, STANDS)
-    assert (run.products, run.trouble, run.refines_net) == (4, None, True)
-    (one,) = recovery.found
-    assert (one.test, one.operation, one.robot, one.response) == ("jammed", "sub1", "", response)
-    assert str(one).startswith("sub1 is jammed: ") and not one.is_death
-    (entry,) = (e for e in run.events if isinstance(e, Undone))
-    assert {*entry.transitions} >= undone
-    report = recovery.report()
-    assert (report.missed, report.false_alarms, report.spares) == (0, 0, 0)
-    assert run.physics is None or run.physics.unintended_contacts == 0
-
-
-@pytest.mark.parametrize("world", WORLDS)
-def test_robots_that_are_stuck_together_fail_once(tmp_path: Path, world: WorldName) -> None:
-    """One failure for both: none is taken for dead as it is to go back already."""
-    layout = laid_out(tmp_path, "mate", "jammed : again 1 then stop, lost : scrap")
-    run, recovery = stopped(layout, world, STANDS, replace(STANDS, robot="r6"))
-    assert (run.products, run.trouble) == (4, None)
-    assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
-    assert {robots for _, robots in recovery.stood} >= {("r5", "r6")}
-
-
 def test_a_robot_whose_lift_still_waits_has_left(steps: Layout) -> None:
     """One of its axes on its way is enough: it is stuck, and not dead."""
     run, recovery = stopped(steps, "ideal", replace(STANDS, robot="r2"), label="s2")
     assert (run.products, run.trouble) == (4, None)
     assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
-
-
-def test_who_does_not_test_for_it_takes_the_robot_for_dead(tmp_path: Path) -> None:
-    layout = laid_out(tmp_path, "mate", "lost : scrap")
-    run, recovery = stopped(layout, "ideal", STANDS)
-    assert run.trouble is not None and "r5 is dead, and there is no spare" in run.trouble.message
-    assert [one.is_death for one in recovery.found] == [True]
-
-
-@pytest.mark.parametrize(
-    ("world", "late", "found"),
-    [("ideal", 8, ["", "r5"]), ("mujoco", 8, ["", "r5"]), ("mujoco", 1, ["r5"])],
-)
-def test_a_robot_that_does_not_go_back_is_dead(
-    tmp_path: Path, world: WorldName, late: int, found: list[str]
-) -> None:
-    """One that had not begun to move is taken for dead at once: going back would tell nothing."""
-    layout = laid_out(tmp_path, "mate", "jammed : again 2 then scrap, lost : scrap")
-    dead = Deviation("dead", robot="r5", at=0.0)
-    run, recovery = stopped(layout, world, dead, spares=1, late=late)
-    assert (run.products, run.trouble, run.refines_net) == (4, None, True)
-    assert [(one.test, one.robot) for one in recovery.found] == [("jammed", r) for r in found]
-    report = recovery.report()
-    assert (report.missed, report.false_alarms, report.spares) == (0, 0, 1)
-
-
-@pytest.mark.parametrize("responses", ["stop", "again 1"])
-def test_the_run_stops_where_the_template_says_so(tmp_path: Path, responses: str) -> None:
-    layout = laid_out(tmp_path, "mate", f"jammed : {responses}, lost : scrap")
-    long = Deviation("down", robot="r5", at=0.0, seconds=500.0 if responses == "stop" else 12.0)
-    run, recovery = stopped(layout, "ideal", long)
-    if responses == "stop":
-        assert [str(one) for one in recovery.found] == ["sub1 is jammed: the run ends"]
-        assert run.trouble is not None and run.trouble.code == "Failed"
-        assert run.trouble.message == "'sub1' fails the test 'jammed'"
-        assert run.trouble.position is not None, "it says where"
-    else:
-        assert run.trouble is None and recovery.found[0].response == "again"
 
 
 @pytest.mark.parametrize("world", WORLDS)
@@ -192,58 +115,3 @@ def test_what_lies_askew_stops_the_run_where_the_template_says_so(
 def test_shipped_templates_that_join_test_for_what_is_stuck(name: str) -> None:
     text = (ROOT / "templates" / f"{name}.op").read_text("utf-8")
     assert "jammed : again 2 then scrap" in text
-
-
-def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
-    """Nothing was missed where the operation was stuck, and nothing was a false alarm."""
-    stuck = Failing(3.0, "jammed", "sub1", "", "again")
-    for struck, found, counts in (
-        ({"bad_joint": 1}, [stuck], (0, 0)),
-        ({"bad_joint": 2}, [stuck], (1, 0)),
-        ({}, [stuck], (0, 0)),
-        ({"dead": 1}, [stuck, Failing(9.0, "jammed", "sub1", "r5", "spare")], (0, 0)),
-        ({}, [Failing(9.0, "jammed", "sub1", "r5", "spare")], (0, 1)),
-    ):
-        report = summed(found, struck, 0, 0, 0, ())
-        assert (report.missed, report.false_alarms) == counts
-
-
-def test_a_robot_that_dies_where_it_went_ahead(steps: Layout) -> None:
-    """No operation waits for it that is under way: it is late all the same, and replaced."""
-    simulation = Simulation(steps, RunRequest("mujoco", 6, recovers=True))
-    recovery = recover(simulation, Campaign(spares=1, swap=4.0))
-
-    def strike(_: State) -> None:
-        world = simulation.physical
-        if not recovery.found and world.parts.holdings.hand(2) and world.sense()[0][4] < 0.01:
-            recovery.strike(Deviation("dead", robot="r3", at=0.0))
-
-    run = simulation.run([strike], max_time=60.0)
-    assert (run.products, run.trouble, run.refines_net) == (6, None, True)
-    assert run.physics is not None and not run.physics.unintended_contacts
-    assert [(one.robot, one.response) for one in recovery.found] == [("r3", "spare")]
-
-
-def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The last product is lost when feeders have nothing to show any more, and a robot whose hand
-    holds from above has gone where its next part would come down: it makes way. Planted: it does
-    not."""
-    layout = read(ROOT / "examples" / "truck.pag").layout
-    robot = layout.factory.by_label["roof"].carrier
-    lift = layout.factory.up(robot)
-    assert lift is not None
-    for is_kept in (True, False):
-        if not is_kept:
-            monkeypatch.setattr(Feeders, "_obstructed", lambda feeders: [])
-        simulation = Simulation(layout, RunRequest("mujoco", 1, recovers=True))
-        recovery = recover(simulation, Campaign())
-
-        def lose(_: State, made: Simulation = simulation, by: Recovery = recovery) -> None:
-            if not by.found and made.supervisor.fired[layout.factory.dropoff.start] == 1:
-                made.physical.motion.put({robot: 0.144, lift: layout.rise(robot)})
-                by.plant.lose(0)
-
-        run = simulation.run([lose], max_time=120.0)
-        assert run.products == 1 and {one.test for one in recovery.found} == {"lost"}
-        assert run.physics is not None
-        assert (run.physics.unintended_contacts == 0) == is_kept

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.apps.foreign_nets.behaviour import play
-from factory.apps.recovery.undo import marking_after, tokens_after, undo
-from factory.theory.nets.history import firings
-from factory.theory.nets.marked import MarkedNet, marked, token_free
-from factory.theory.nets.petri import Marking
-from factory.theory.nets.undone import Joins, Undone
+from factory.apps.recovery.undo import tokens_after, undo
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.undone import Joins
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import NOPART
-from tests.fold_values import inserted, plain, random_fold, three_robots
+from tests.fold_values import random_fold
 from tests.net_values import fair_run, random_marked_net
 from tests.pag_values import factory_of, paper
-from tests.token_game import enabled, follower
 
 Counts = tuple[int, ...]
 randoms = st.randoms(use_true_random=False)
@@ -103,17 +98,6 @@ def test_what_cannot_be_undone() -> None:
 # --- Theorem 5, at every marking -----------------------------------------------------------------
 
 
-def reachable(factory: Factory) -> set[Marking]:
-    """Every marking, by the token game."""
-    net, start = factory.net.threaded.net, factory.net.initial_marking
-    seen, todo = {start}, [start]
-    for marking in todo:
-        there = {follower(net, marking, (event,)) for event in enabled(net, marking)}
-        todo += there - seen
-        seen |= there
-    return seen
-
-
 def failures(factory: Factory, fired: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """All that can be asked: to redo what is under way, and what to do about a lost pile."""
     for o in factory.operations:
@@ -122,87 +106,3 @@ def failures(factory: Factory, fired: Sequence[int]) -> Iterator[tuple[int, ...]
             yield (o.start,)
         if parent >= 0 and fired[o.end] > fired[factory.operations[parent].end]:
             yield (o.end,)
-
-
-def held(factory: Factory, marking: Marking) -> dict[int, str]:
-    """What each robot has, by the place that it is at."""
-    found = {}
-    for number, gear in enumerate(factory.net.gears):
-        step = next(i for i, place in enumerate(gear.places) if place in marking)
-        operation = factory.operations[factory.robots[number].operations[step // 2]]
-        found[number] = operation.before[operation.robots.index(number)]
-    return found
-
-
-def wanting(factory: Factory, fired: Counts, after: Counts, asked: Iterable[int] = ()) -> list[str]:
-    """What robots would have to hold after an undo that they did not hold before it, or have lost:
-    that of which the end is asked to be undone."""
-    lost = {factory.operations[event // 2].label for event in asked if event % 2}
-    had, has = (held(factory, marking_after(factory.net, n)) for n in (fired, after))
-    pairs = has.items()
-    return [x for robot, x in pairs if x != NOPART and (x != had[robot] or x in lost)]
-
-
-PAPER: list[tuple[Callable[[], Factory], int, int]] = [
-    (three_robots, 26, 49),
-    (lambda: plain(inserted(paper())), 78, 199),
-    (lambda: factory_of(paper()), 342, 1_377),
-]
-
-
-@pytest.mark.parametrize(("made", "markings", "undos"), PAPER)
-def test_every_failure_at_every_marking(
-    made: Callable[[], Factory], markings: int, undos: int
-) -> None:
-    """None leaves the reachable set, or asks a robot to hold what it had not."""
-    factory = made()
-    net, seen, count, bad = marked(factory.net), reachable(factory), 0, 0
-    for marking in seen:
-        least = firings(factory.net, marking)
-        fired = tuple(least[event] + 3 for event in range(len(least)))
-        for asked in failures(factory, fired):
-            after = undo(net, fired, asked, factory.joins)
-            assert marking_after(net, after) in seen
-            assert wanting(factory, fired, after, asked) == []
-            bad += bool(wanting(factory, fired, undo(net, fired, asked, {})))
-            count += 1
-    assert (len(seen), count) == (markings, undos)
-    assert bad > 0, "without the material rule no robot would be asked for what it had not"
-
-
-@given(st.integers(0, 10**6), randoms)
-def test_undos_of_folds(seed: int, rng: random.Random) -> None:
-    """The marking is reached by firing so often, nothing is stuck there, and no robot is asked to
-    hold what it had not; so again for a second failure."""
-    factory = random_fold(seed, 16)
-    net, made = marked(factory.net), factory.joins
-    fired = fired_by(factory, rng.randint(1, 8 * len(factory.operations)), rng)
-    for _ in range(2):
-        every = [*failures(factory, fired)]
-        if not every:
-            return
-        asked = rng.choice(every)
-        after = undo(net, fired, asked, made)
-        assert all(after[event] < fired[event] for event in asked)
-        assert wanting(factory, fired, after, asked) == []
-        check_reached(net, after)
-        fired = after
-
-
-def check_reached(net: MarkedNet, fired: Counts) -> None:
-    """That the counts can be fired from m_0, and that no circuit is then free of tokens."""
-    tokens = tokens_after(net, fired)
-    played = [*play(net, dict(enumerate(fired)))]
-    assert tuple(played.count(event) for event in range(len(fired))) == fired
-    assert token_free(MarkedNet(net.net, tokens)).stuck == ()
-
-
-def test_how_often_each() -> None:
-    """A pile is lost with all that made it; what was made for the next unit is not."""
-    factory = factory_of(paper())
-    names = [t.name for t in factory.net.threaded.transitions]
-    twice, once = {"part1_s", "part1_e"}, {"part2_s", "part2_e", "sub1_s", "sub1_e"}
-    fired = tuple(2 * (name in twice) + (name in once) for name in names)
-    after = undo(factory.net, fired, (factory.by_label["sub1"].end,), factory.joins)
-    undone = Undone.between(factory.net, (1.0, "sub1", "lost"), (), fired, after)
-    assert sorted(undone.transitions) == sorted(twice | once)

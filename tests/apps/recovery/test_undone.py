@@ -9,14 +9,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from factory.apps.recovery.undo import marking_after, tokens_after, undo
-from factory.theory.nets.history import firings
 from factory.theory.nets.replay import ReplayVerdict, replay
 from factory.theory.nets.undone import Entry, Joins, Undone, lasting
 from factory.theory.plant.factory import Factory
 from tests.apps.recovery.test_undo import failures
-from tests.fold_values import inserted, plain, random_fold, three_robots
-from tests.net_values import random_legal_marking
-from tests.pag_values import SHAPES, factory_of, paper, random_pag
+from tests.fold_values import random_fold, three_robots
 
 seeds = st.integers(0, 10**6)
 randoms = st.randoms(use_true_random=False)
@@ -83,22 +80,6 @@ def test_a_run_with_failures_replays(seed: int, rng: random.Random) -> None:
     assert (left.refines, left.marking) == (True, found.marking)
 
 
-@given(seeds, randoms)
-def test_a_run_that_began_elsewhere(seed: int, rng: random.Random) -> None:
-    """What had fired before it may be undone too."""
-    factory = plain(inserted(random_pag(rng.randint(1, 9), seed, rng.choice(SHAPES), 3)))
-    start = random_legal_marking(factory.net, rng)
-    story = Story(factory, rng)
-    before = firings(factory.net, start)
-    story.fired = [before[event] for event in range(len(before))]
-    story.run(rng.randint(0, 6))
-    assume(story.fail())
-    story.run(6)
-    found = replay(factory.net, story.entries, start, factory.joins)
-    assert (found.refines, found.reason) == (True, "")
-    assert found.marking == marking_after(factory.net, story.fired)
-
-
 @given(seeds, randoms, st.integers(0, 4))
 def test_any_other_undo_is_refused(seed: int, rng: random.Random, how: int) -> None:
     """A transition less, one more, one in place of another, nothing, something else asked for."""
@@ -124,20 +105,6 @@ def test_any_other_undo_is_refused(seed: int, rng: random.Random, how: int) -> N
     assert not found.refines
     assert found.index == at
     assert "the undo of x" in found.reason
-
-
-def test_an_undo_without_the_material_rule_is_refused() -> None:
-    """Where the rule makes a difference: sub1 is lost, and its parts are said to be there."""
-    factory = factory_of(paper())
-    names = ["part1_s", "part1_e", "part2_s", "part2_e", "sub1_s", "sub1_e"]
-    undone = Undone(1.0, "sub1", "lost", ("sub1_e",), ("sub1_e",))
-    found = replay(factory.net, [*names, undone], None, factory.joins)
-    assert (found.refines, found.index) == (False, 6)
-    words = "the undo of sub1 takes back part1_e 0 times, where 1 is the least"
-    assert found.reason == words
-    assert {factory.net.threaded.places[p].name for p in found.marking} >= {"r3:sub1"}
-    right = replace(undone, transitions=tuple(names))
-    assert replay(factory.net, [*names, right], None, factory.joins).refines
 
 
 def test_the_reasons() -> None:
