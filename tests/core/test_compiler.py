@@ -112,10 +112,7 @@ TWO = "root = s; s = mate(a, b); a = atomic(); b = atomic()"
 @pytest.mark.parametrize(
     ("goals", "eps", "words"),
     [
-        ("A1, A2, B3", "eps", "touching"),
-        ("A1 + 0.3r, A2 + 0.3r, B3", "eps", "touching"),
         ("A1 - 2r, A2 + 2r, B3", "eps", "off the guidepath"),
-        ("A1 + 2r, A2 + 2r, B3 + r", "eps", "off the guidepath"),
         ("A2 + 2r, A1 + 2r, B3", "eps", "no point of robot 1"),
     ],
 )

@@ -13,7 +13,7 @@ from factory.theory.nets.coordinated import Coordination
 from tests.examples import with_hands
 
 
-@pytest.mark.parametrize("name", ["stool", "truck"])
+@pytest.mark.parametrize("name", ["truck"])
 def test_an_order_with_its_tokens_exchanged_is_refused(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

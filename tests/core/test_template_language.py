@@ -37,13 +37,8 @@ def codes(text: str) -> list[str]:
 @pytest.mark.parametrize(
     "text",
     [
-        MATE.replace("\n", " "),
-        "\ufeff" + MATE.replace("\n", "\r\n"),
-        MATE.replace(" ", "").replace("where", "where ").replace("onWto", " on W to "),
-        MATE.replace("A1 + 2r", "A1+2 r").replace("A2 + 2r", "A2 +\n2.0r"),
-        MATE.rstrip().rstrip(";") + " // the end",
         "// the beginning\n"
-        + MATE.replace("j = 3;", "; // the carrier\n").replace("further", "j = 3; further"),
+        + MATE.replace("j = 3;", "; // the carrier\n").replace("further", "j = 3; further")
     ],
 )
 def test_layout_does_not_matter(text: str) -> None:
@@ -51,17 +46,7 @@ def test_layout_does_not_matter(text: str) -> None:
     assert read_template(text) == read_template(MATE)
 
 
-@pytest.mark.parametrize(
-    ("written", "point"),
-    [
-        ("A1", Point("A", 1)),
-        ("B1 - r", Point("B", 1, -1.0)),
-        ("S1+0.5r", Point("S", 1, 0.5)),
-        ("A1 - .5r", Point("A", 1, -0.5)),
-        ("A1 + 1e-3r", Point("A", 1, 1e-3)),
-        ("A1 + 0r", Point("A", 1)),
-    ],
-)
+@pytest.mark.parametrize(("written", "point"), [("B1 - r", Point("B", 1, -1.0))])
 def test_points(written: str, point: Point) -> None:
     text = """x = (R, j, ~, <a; b>, F) where R = <dot>; j = 1; ~ = {};
         <a; b> = <nopart; LAB1>; F = hold on W to %s within 0.001 for 2"""
@@ -72,8 +57,7 @@ def test_points(written: str, point: Point) -> None:
 
 def test_parameters() -> None:
     text = MATE.replace(
-        "further = insert",
-        'parameters = ( dwell = 1.5, tool = "drill", at = ( 1, 2 ) )',
+        "further = insert", 'parameters = ( dwell = 1.5, tool = "drill", at = ( 1, 2 ) )'
     ).replace("within eps", "within eps for dwell")
     template = read_template(text)
     assert template.parameters == (("dwell", 1.5), ("tool", "drill"), ("at", (1.0, 2.0)))

@@ -92,7 +92,7 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
         assert [fault.code for fault in faults] == ["Record", "Blocked"] and not why
 
 
-@pytest.mark.parametrize("word", ["base:pg", "peg:peg", "a:b:c:d", "0.5mi", "-1mm", "peg:", ":1mm"])
+@pytest.mark.parametrize("word", ["base:pg", "a:b:c:d", "-1mm"])
 def test_what_is_no_overlap_to_allow(run: Terminal, deep: Path, word: str) -> None:
     done = run("check", deep, "--allow", word)
     assert done.status == 2 and "--allow" in done.err
@@ -118,11 +118,8 @@ def test_a_pag_allows_overlaps_and_is_written_so() -> None:
     [
         ("allow ( peg, bse, 0.1 )", "UndefinedLabel", "did you mean 'base'?"),
         ("allow ( s, base, 0.1 )", "BadValue", "name the parts of it"),
-        ("allow ( peg, base )", "BadValue", "allow ( peg, frame, 0.0005 )"),
         ("allow ( peg, base, -1 )", "BadValue", "allow ( 0.0005 )"),
-        ("allow ( peg, peg, 1 )", "BadValue", "of two parts"),
         ("allow ( )", "Syntax", "up to a depth"),
-        ("allow ( peg base )", "Syntax", "up to a depth"),
     ],
 )
 def test_what_a_pag_cannot_allow(statement: str, code: str, said: str) -> None:

@@ -33,7 +33,7 @@ def test_a_variant_that_no_app_gives_is_refused_by_name() -> None:
     assert "platen, relay" in str(refused.value)
 
 
-@pytest.mark.parametrize("given", [App("platen"), "platen"])
+@pytest.mark.parametrize("given", ["platen"])
 def test_what_is_no_app_of_its_own_is_refused(
     given: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -121,9 +121,7 @@ def test_an_app_from_outside_gives_a_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("word", "place", "why"),
     [
-        ("run", "os:getcwd", "gives the command 'run', which is there already"),
         ("plan", "os:getcwd", "gives the command 'plan', which is there already"),
-        ("hello", "nowhere.at.all:hello", "No module named 'nowhere'"),
         ("hello", "os:hello", "has no attribute 'hello'"),
         ("hello", "json:dumps", "the command 'hello' of an app is no click.Command"),
     ],
@@ -148,7 +146,7 @@ def _forget() -> None:
     commands.places.cache_clear()
 
 
-@pytest.mark.parametrize("table", [{"hello": 3}, {"hello": "module"}, {3: "module:hello"}])
+@pytest.mark.parametrize("table", [{3: "module:hello"}])
 def test_a_table_of_an_app_has_places(table: Any) -> None:
     with pytest.raises(TypeError, match="is no place"):
         App("greeting", commands=table)

@@ -12,7 +12,6 @@ import pytest
 from benches import reporting
 from benches.compare.__main__ import REPORT as COMPARISON
 from benches.faults.__main__ import REPORT as FAULTS
-from benches.fidelity.__main__ import REPORT as FIDELITY
 from benches.reporting import Report
 from benches.speed import large, processes
 from benches.speed.__main__ import REPORT
@@ -34,7 +33,7 @@ def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) ->
 
 
 @pytest.mark.parametrize(
-    "report", [REPORT, FAULTS, FIDELITY, COMPARISON], ids=lambda report: report.path.stem
+    "report", [REPORT, FAULTS, COMPARISON], ids=lambda report: report.path.stem
 )
 def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
     assert report.text() == report.path.read_text()

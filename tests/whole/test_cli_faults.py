@@ -163,9 +163,7 @@ def test_devices_are_written_in_place(run: Terminal, out: Path) -> None:
         assert pipe.read_text().startswith("digraph")
 
 
-@pytest.mark.parametrize(
-    ("name", "words"), [("p.xml", ["-o", "."]), ("p.mjb", ["--mjcf", "p.xml"])]
-)
+@pytest.mark.parametrize(("name", "words"), [("p.xml", ["-o", "."])])
 def test_what_build_names_itself_is_not_the_input(
     run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: list[str]
 ) -> None:

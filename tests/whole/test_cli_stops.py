@@ -21,14 +21,7 @@ from tests.paths import PAPER, ROOT, files_in
 @pytest.mark.parametrize(
     ("geometry", "status"),
     [
-        ("box = (9e2, 9e2, 9e2)", {0, 1}),
-        ("sphere = 1e-7", {0}),
         ("sphere = 0.02, mass = 1e11", {0, 1}),
-        ("sphere = 0.02, mass = 1e-30", {0}),
-        ("sphere = 0.02, quat = (1e-200, 0, 0, 1e-200)", {0}),
-        ("sphere = 0.02, quat = (1e300, 1e300, 0, 0)", {0}),
-        ("box = (1e200, 1, 1)", {2}),
-        ("sphere = 1e120", {2}),
         ("sphere = 1, pos = (1e300, 0, 0)", {2}),
         ("sphere = 1, density = 1e300", {2}),
         ("sphere = 1e-150, density = 1e-300", {2}),

@@ -33,32 +33,19 @@ def folder(tmp_path: Path) -> Path:
 MISTAKES = [
     (
         '"labels", "pag"',
-        '"labels", "paper"',
-        2,
-        "TAKES of this exporter is 'paper', not one of net",
-    ),
-    (
-        '"labels", "pag"',
         '"dot", "pag"',
         2,
         "FORMAT of this exporter is 'dot', which there is already",
     ),
-    ('"labels", "pag"', '3, "pag"', 2, "FORMAT of this exporter is 3, not a name"),
-    ("def export(subject):", "export = 3\ndef other(subject):", 5, "export of this exporter is no"),
     ("def export", "def exporting", 1, "export of this exporter is no function"),
-    ("subject.project", "subject.proyect", 6, "AttributeError: 'Subject' object has no attribute"),
-    ("FORMAT, TAKES", "import nothing_of_this_name\nFORMAT, TAKES", 2, "ModuleNotFoundError: No"),
     ('"pag"\n', '"pag\n', 2, "SyntaxError: unterminated string"),
     ("subject):\n", "subject):\n    exit(7)\n", 6, "SystemExit: 7"),
-    ('return "', 'return b"" or 7 or "', 5, "the exporter labels gave int, not a text or files"),
     ('return "', 'return b"x" or "', 5, "the exporter labels gave bytes, not a text or files"),
     ('return "', 'return "\\ud800" or "', 5, "the exporter labels gave a text with a lone"),
     ('return "', 'return {} if 1 else "', 5, "the exporter labels gave no file"),
     ('return "', 'return {"": "x"} or "', 5, "the exporter labels gave str for the file '', not"),
-    ('return "', 'return {"": None} or "', 5, "the exporter labels gave NoneType for the file ''"),
     ('return "', 'return {7: b"x"} or "', 5, "the exporter labels gave a file whose name is 7,"),
     ('return "', 'return {"a\\0": b""} or "', 5, "the exporter labels gave a file whose name 'a"),
-    ('return "', 'return {"\\ud8f0": b""} or "', 5, "the exporter labels gave a file whose name"),
 ]
 
 
@@ -81,11 +68,7 @@ def test_a_mistake_names_file_line_and_reason(
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("../outside.txt", "a file that is not in the folder"),
         ("/tmp/outside.txt", "a file that is not in the folder"),
-        ("link/outside.txt", "a file that is not in the folder"),
-        (".", "a file that is not in the folder"),
-        ("x/../own.pag", "a file that is the source"),
         ("own.pag", "a file that is the source"),
     ],
 )
@@ -138,22 +121,10 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 PACKAGE_MISTAKES = [
-    ("laws.py", "navigation(template", "navigation(templates", 5, "NameError: name 'templates'"),
     ("laws.py", "return navigation", "return 3 or navigation", 4, "gave int, not a Mode"),
     ("laws.py", "def near", "def far", None, "has no attribute 'near'"),
     ("robots/catalogue.toml", "[dabber]", "[dot]", 1, "there is a robot type 'dot' already"),
     ("robots/catalogue.toml", '"tool"', '"toool"', 1, "did you mean 'tool'?"),
-    ("robots/catalogue.toml", 'mjcf = "', "mjcf = ", 2, "Syntax Invalid value"),
-    ("robots/catalogue.toml", "mjcf", "file", 1, "'dabber' has the unknown key 'file'"),
-    (
-        "robots/dabber.xml",
-        "</actuator>",
-        "</actuators>",
-        37,
-        "Syntax not well-formed XML: mismatched",
-    ),
-    ("templates/dab.op", "dot, dabber", "dot, daber", 3, "unknown"),
-    ("count.py", "len(", "length(", 6, "NameError: name 'length'"),
 ]
 
 

@@ -30,7 +30,7 @@ def laid_out(text: str, folder: Path) -> Layout:
     return read(file).layout
 
 
-@pytest.mark.parametrize("distributed", [False, True])
+@pytest.mark.parametrize("distributed", [False])
 def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path: Path) -> None:
     asked = RunRequest(units=2, jitter=0.3, seed=1, distributed=distributed)
     run = watched(Simulation(laid_out(BOX, tmp_path), asked), (), 60.0)

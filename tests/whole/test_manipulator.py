@@ -43,9 +43,7 @@ def written(folder: Path, text: str) -> Path:
 @pytest.mark.parametrize(
     ("statement", "code", "words"),
     [
-        ("mate ( base, peg )", "NeedsTurn", "'peg' is presented turned by 0.61 rad"),
         ("mate ( base, held ); held = relay ( peg )", "NeedsTurn", "'mate' turns nothing"),
-        ("place ( base, held ); held = weld ( peg )", "NeedsTurn", "'weld' turns nothing"),
         ("place ( peg, base )", "NeedsTurn", "'place' turns nothing"),
     ],
 )

@@ -58,10 +58,7 @@ def within_boxes(simulation: Simulation) -> bool:
     return bool((least <= low[:, :2]).all() and (high[:, :2] <= most).all())
 
 
-@pytest.mark.parametrize(
-    ("name", "given"),
-    [("fence", {}), ("chest", {"fuse": True}), ("20", {}), ("tee", {}), ("bar", {})],
-)
+@pytest.mark.parametrize(("name", "given"), [("tee", {}), ("bar", {})])
 def test_what_a_holder_has_is_within_its_box(name: str, given: dict[str, Any]) -> None:
     simulation = ready(name, **given)
     while simulation.physical.time < 8.0:

@@ -36,7 +36,7 @@ def of_the_gearbox() -> tuple[NoGrip, ...]:
         return found(file)
 
 
-@pytest.mark.parametrize("name", ["input", "output"])
+@pytest.mark.parametrize("name", ["output"])
 def test_a_miss_is_met_by_all_that_it_names(name: str) -> None:
     grip = next(grip for grip in of_the_gearbox() if grip.label == name)
     assert {miss.kind for miss in grip.misses} == {"below", "behind", "above"}

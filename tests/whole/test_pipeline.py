@@ -17,17 +17,7 @@ from factory.theory.problem.plan import Plan
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
 
-FAMILY = ROOT / "examples" / "family.pag"
-
-UNFIT = (
-    (PAPER, "--relay", "--parallel", "sub2=2"),
-    (PAPER, "--relay", "--robots", "least"),
-    (FAMILY, "--relay"),
-    (FAMILY, "--relay", "--parallel", "body=2"),
-    (FAMILY, "--demand", 3, "--distributed"),
-    (PAPER, "--demand", 3, "--world", "ideal"),
-    (PAPER, "--fuse", "--world", "ideal"),
-)
+UNFIT = ((PAPER, "--fuse", "--world", "ideal"),)
 """Files and options that do not go together."""
 
 

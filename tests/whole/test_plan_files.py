@@ -86,23 +86,11 @@ LAYOUT = {
 }
 
 LESSONS: list[tuple[str, Any, str]] = [
-    ("", [], "the table must be a table, not []"),
     ("clearence", 1, "the table has no key 'clearence': did you mean 'clearance'?"),
-    ("clearance", "wide", "'clearance' must be a number within ±1e+09, not 'wide'"),
-    ("clearance", True, "'clearance' must be a number within ±1e+09, not True"),
-    ("clearance", float("nan"), "'clearance' must be a number within ±1e+09, not nan"),
-    ("clearance", 10**400, "'clearance' must be a number within ±1e+09, not 1000"),
-    ("clearance", 0, "clearance must be above 0, not 0.0"),
-    ("visits", 1.0, "'visits' must be a list, not 1.0"),
-    ("visits", [[[]]], "'visits[0][0]' must be a table, not []"),
     ("outfeed", [1.0], "'outfeed' must be a list of 4, not [1.0]"),
-    ("guidepaths", [{}], "'guidepaths[0]' lacks the key 'heading'"),
-    ("guidepaths", [{**GUIDEPATH, "a": 0}], "'guidepaths[0].a' must be a list, not 0"),
     ("guidepaths", [{**GUIDEPATH, "side": [1, 0]}], "guidepaths[0] must lie along the axes"),
     ("guidepaths", [{**GUIDEPATH, "reach": 0}], "guidepaths[0] must have a travel from 0 and"),
-    ("hands", [{"kind": "glue", "places": []}], "'hands[0].kind' must be one of below, behind,"),
     ("hands", [{"kind": "below", "places": []}], "hands[0] must have places"),
-    ("standby", [[0]], "the table has no key 'standby'"),
 ]
 
 
@@ -188,27 +176,13 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
     ("change", "code", "words"),
     [
         (lambda t: "{", "BadPlan", "plan.json:1:2: BadPlan it is not JSON"),
-        (lambda t: "[" * 10**5, "BadPlan", ""),
         (lambda t: "[]", "BadPlan", "its schema must be 'factory.plan.1'"),
-        (lambda t: {**t, "schema": 1}, "BadPlan", "its schema must be 'factory.plan.1', not 1"),
-        (lambda t: {**t, "plan": 1}, "BadPlan", "'plan' must be a table, not 1"),
-        (lambda t: {**t, "plan": {"form": {}}}, "BadPlan", "did you mean 'forms'?"),
         (lambda t: {**t, "plan": {"forms": {"sub1": 7}}}, "BadPlan", "numbers from -1 to 1, not 7"),
-        (lambda t: {**t, "plan": {"turns": [[0]]}}, "BadPlan", "a robot for each of"),
-        (lambda t: {**t, "plan": {"turns": [[]]}}, "BadPlan", "a robot for each of"),
-        (
-            lambda t: {**t, "plan": {"turns": [[0, 1, 2, 3, 4, 9]]}},
-            "BadPlan",
-            "10 robots are named",
-        ),
         (lambda t: {**t, "plan": {"turns": [[0] * 6]}}, "BadPlan", "cannot take two parts in"),
         (
             lambda t: {**t, "plan": {"turns": [[*range(6)]], "lifts": [6]}},
             *("BadPlan", "r7 has a lift"),
         ),
-        (lambda t: {**t, "settings": {"speed": 0}}, "BadPlan", "speed = 0 is not between"),
-        (lambda t: {**t, "settings": {"speed": "a"}}, "BadPlan", "'settings.speed' must be a num"),
-        (lambda t: {**t, "ground": {"floor": [1]}}, "BadPlan", "'ground.floor' must be a list of"),
         (lambda t: {**t, "templates": {"mate": "x"}}, "Syntax", "mate:1:2: "),
         (lambda t: {**t, "pag": {**t["pag"], "text": "x"}}, "Syntax", ""),
         (
@@ -216,8 +190,6 @@ def test_what_does_not_go_with_a_plan(run: Terminal, built: Path, tmp_path: Path
             "BadPlan",
             "'pag': file must be the",
         ),
-        (lambda t: {k: v for k, v in t.items() if k != "pag"}, "BadPlan", "lacks the key 'pag'"),
-        (lambda t: {k: v for k, v in t.items() if k != "ground"}, "BadPlan", "no 'ground'"),
     ],
 )
 def test_plans_that_are_refused(
@@ -247,11 +219,9 @@ def _raise(table: list[list[dict[str, Any]]], rows: Sequence[tuple[int, int]]) -
     [
         (lambda rows: rows[0].pop(), r"visits\[0\] must be a list of 3, one for each robot"),
         (lambda rows: rows[0][1].update(at=9.0), "r2 stands .* mm beyond the end of its guidepath"),
-        (lambda rows: rows[0][1].update(lift=1e-3), "1.0 mm from its place in"),
         (lambda rows: _raise(rows, [(0, 1)]), "the same up, elevation and shift"),
-        (lambda rows: _raise(rows, [(0, 1), (1, 0)]), "2.0 mm from its place in"),
     ],
-    ids=["robots", "guidepath", "lift", "tour", "height"],
+    ids=["robots", "guidepath", "tour"],
 )
 def test_visits_that_are_refused(change: Callable[[Any], object], words: str) -> None:
     """A layout is not read whose robots are not on their guidepaths, or bring what they bring

@@ -112,36 +112,25 @@ def test_what_is_read_is_what_the_engine_compiles(
 
 
 WRONG = [
-    (BOX, BOX.replace("0.0175", "0.03"), 22, "reaches from 2.5 to 62.5 mm up"),
     (BOX, BOX.replace("0.03 0.03", "0.51 0.03"), 22, "510 mm from the mast's axis"),
     (BOX, BOX.replace(' mass="1.6"', ""), 22, "has no mass"),
     (BOX, BOX.replace("1.6", "nan"), 22, "mass of <geom> is 'nan'"),
-    (BOX, BOX + ' euler="0 0 30"', 22, "<geom> has 'euler', which is not read"),
     ('size="0.009 0.009 0.0175"', 'size="0.009 0.02 0.0175"', 23, "20 mm from the mast's axis"),
     ('size="0.03 0.008 0.009"', 'size="0.03 0.02 0.009"', 24, "20 mm to a side"),
     ('name="stripe" class="shown"', 'name="stripe" class="solid" mass="0"', 29, "is solid"),
     ('size="0.0305 0.0305 0.002"', 'size="0.09 0.0305 0.002"', 29, "is seen 90 mm from"),
     ('name="cap"', 'name="tower"', 30, "as a limb of a hand is"),
     ('contype="1"', 'contype="0"', 22, "contype 0, conaffinity 1"),
-    ('condim="3"', 'condim="3" margin="0.01"', 8, "<geom> has 'margin'"),
     ('name="slide" type="slide"', 'name="slide" type="hinge"', 21, "is of the type hinge"),
-    (
-        'name="slide" type="slide"',
-        'name="sled" type="slide"',
-        21,
-        "the joint 'sled' is in",
-    ),
+    ('name="slide" type="slide"', 'name="sled" type="slide"', 21, "the joint 'sled' is in"),
     ('axis="-1 0 0"', 'axis="0 -1 0"', 21, "has the axis 0 -1 0"),
     ('axis="-1 0 0"', 'axis="-1 0 0" range="-1 1"', 21, "<joint> has 'range'"),
     ('<site name="nest"', '<site name="tip"', 20, "its sites are 'tip' in 'carriage'"),
     (DRIVE, f'{DRIVE} kp="4000"', 36, "one of kp and kv"),
     (DRIVE, f'{DRIVE} forcerange="-10 50"', 36, "forcerange of 'slide' is -10 50"),
     ('<position name="drive"', '<motor name="drive"', 36, "<motor> inside <actuator>"),
-    ("<default>\n", '<default>\n<geom margin="1"/>\n', 7, "<geom> has 'margin'"),
-    ('<mujoco model="dot">', '<mujoco model="dot"><compiler angle="radian"/>', 5, "<compiler>"),
     ('<body name="carriage">', '<body name="carriage" pos="0.1 0 0">', 20, "<body> has 'pos'"),
     (SHELL, '<body name="head">', 26, "the geom 'finger' is in 'head'"),
-    ('material="paint"/>', 'material="pant"/>', 22, "of the material 'pant'"),
     ('<material name="rubber"', '<material name="gum"', 5, "no material 'rubber'"),
 ]
 
@@ -168,7 +157,6 @@ def test_what_cannot_differ_is_refused_at_its_line(
     [
         ('forcerange="-5 5"', "the motor of 'slide' gives 5 N, and r1, with 0.61 kg, needs"),
         ('kp="40" kv="15"', "kp 40 and kv 15 of 'slide' do not keep r1"),
-        ('kp="9000" kv="20"', "kp 9000 and kv 20 of 'slide' do not keep r1"),
     ],
 )
 def test_a_drive_that_cannot_follow_is_refused(tmp_path: Path, drive: str, why: str) -> None:

@@ -129,7 +129,6 @@ def test_a_branch_of_a_tee_is_not_replicated_itself() -> None:
 @pytest.mark.parametrize(
     ("labels", "words"),
     [
-        (("part1", "part2"), "'part1' and 'part2' are both needed in 'sub1'"),
         (("part3", "part1"), "cannot share a stem: they deliver to different robots"),
         (("part1", "part2", "part3"), "has room for 2 robots"),
     ],

@@ -14,7 +14,7 @@ from factory.support.errors import InputError
 from tests.simulation_values import FINE, layout_of, ready
 
 Name = Literal["mujoco", "ideal"]
-WORLDS: tuple[Name, ...] = ("mujoco", "ideal")
+WORLDS: tuple[Name, ...] = ("ideal",)
 
 
 def run_in(world: Name, units: int = 2, **given: Any) -> Simulation:

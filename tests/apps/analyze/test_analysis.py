@@ -68,13 +68,8 @@ def test_what_people_read(run: Terminal, golden: Callable[[str, str], None]) -> 
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--second", "r44"), "Usage there is no robot 'r44'"),
         (("--faster", "r4"), "BadValue --faster takes a robot and percent above 0"),
-        (("--faster", "r4=nan"), "BadValue faster takes"),
-        (("--shorter", "r4=101"), "at most 100, not 'r4=101'"),
         (("--shorter", "x=10"), "Usage there is no robot 'x'"),
-        (("--wip", "0"), "Usage"),
-        (("--measured", "no.log"), "BadLog 'no.log' cannot be read"),
         (("--measured", PAPER), "is no log of factory"),
         (("--measured", "no.log", "--run"), "Usage --measured LOG and --run exclude each other"),
     ],

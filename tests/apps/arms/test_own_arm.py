@@ -88,7 +88,6 @@ def test_what_a_file_leaves_out_of_contact_stays_so(own: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "code", "words"),
     [
-        (('<site name="tool" pos="0 0 0.02"/>', ""), "BadArm", "no site 'tool'"),
         (('<numeric name="speed" data="2 2 2 2 2 2 2"/>', ""), "BadArm", "no speed"),
         (('type="mesh"', 'type="mish"'), "BadArm", "cannot compile"),
     ],

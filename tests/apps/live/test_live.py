@@ -37,17 +37,7 @@ PARTS = ("part1", "part2", "part3")
 
 @pytest.mark.parametrize(
     ("message", "command"),
-    [
-        ('{"do": "pause"}', Command("pause")),
-        ('{"do": "step", "more": 1}', Command("step")),
-        ('{"do": "speed", "factor": 0}', Command("speed", factor=0)),
-        ('{"do": "push", "robot": 5, "share": -1}', Command("push", robot=5, share=-1)),
-        ('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1)),
-        (
-            '{"do": "block", "part": "part2", "blocked": false}',
-            Command("block", part="part2", blocked=False),
-        ),
-    ],
+    [('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1))],
 )
 def test_commands_are_read(message: str, command: object) -> None:
     assert command_of(message, 6, PARTS) == command
@@ -56,22 +46,9 @@ def test_commands_are_read(message: str, command: object) -> None:
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ("no json", "JSON object"),
         (b"\xff\xfe", "JSON object"),
         ("[1]", "JSON object"),
-        ("[" * 2000, "JSON object"),
-        ("{}", "'do' is None: there are pause"),
-        ('{"do": ["pause"]}', "there are pause"),
-        ('{"do": "explode"}', "'do' is 'explode': there are pause"),
-        ('{"do": "push", "robot": 6, "share": 1}', "'robot' of 'push' is 6: a number from 0 to 5"),
-        ('{"do": "push", "robot": true, "share": 1}', "'robot' of 'push' is True"),
-        ('{"do": "push", "robot": 1.0, "share": 1}', "'robot' of 'push' is 1.0"),
         ('{"do": "push", "robot": 1, "share": 1e9}', "'share' of 'push' is 1000000000.0: one of"),
-        ('{"do": "push", "robot": 1, "share": NaN}', "'share' of 'push' is nan"),
-        ('{"do": "slow", "robot": 1}', "'factor' of 'slow' is None: one of (0.1"),
-        ('{"do": "slow", "robot": 1, "factor": 0}', "'factor' of 'slow' is 0"),
-        ('{"do": "speed", "factor": "2"}', "'factor' of 'speed' is '2'"),
-        ('{"do": "block", "part": "sub1", "blocked": true}', "'part' of 'block' is 'sub1'"),
         ('{"do": "block", "part": "part1", "blocked": 1}', "true or false"),
     ],
 )

@@ -74,7 +74,7 @@ def test_each_operation_has_its_room(planning: Planning, run: Terminal, tmp_path
         assert line.endswith("nothing near" if room is None else f"room {1e3 * room:.2f} mm")
 
 
-@pytest.mark.parametrize("drawn", [False, True])
+@pytest.mark.parametrize("drawn", [False])
 def test_the_report_has_the_way_and_the_room_of_an_operation(
     planning: Planning, run: Terminal, tmp_path: Path, drawn: bool
 ) -> None:
@@ -195,13 +195,7 @@ def test_the_time_that_is_asked_for_bounds_proofs_of_small_products(planning: Pl
     assert done.json["figures"]["layouts"] == 1 and not done.json["optimal"]
 
 
-@pytest.mark.parametrize(
-    ("where", "kept"),
-    [
-        ("factory.apps.planning.plan.blocking", False),
-        ("factory.apps.planning.exploded.ExplodedView.film", True),
-    ],
-)
+@pytest.mark.parametrize(("where", "kept"), [("factory.apps.planning.plan.blocking", False)])
 def test_a_signal_is_heard_at_once(
     planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: str, kept: bool
 ) -> None:

@@ -118,7 +118,7 @@ def test_what_comes_after_a_part_that_lies_askew_hangs_straight() -> None:
     assert_recovered(run, failures, {"misplaced": len(leaves)})
 
 
-OFFS = ({"metres": 3e-4}, {"metres": 1.5e-3}, {"degrees": 0.02, "metres": 0.0}, {"degrees": 2.0})
+OFFS = ({"metres": 1.5e-3},)
 
 
 @pytest.mark.parametrize("off", OFFS)

@@ -118,13 +118,8 @@ def test_hostile_names_are_text(log: Path, tmp_path: Path, made: Page) -> None:
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [
-        (lambda h: h.pop("product"), "'product'"),
-        (lambda h: h.update(start=[0, 99]), "start must be numbers of places, below 19"),
-        (lambda h: h["pag"].update(file=3), "'header.pag.file' must be a text"),
-        (lambda h: h.update(seed="x"), "'header.seed' must be a whole number"),
-    ],
-    ids=["product", "start", "file", "seed"],
+    [(lambda h: h.update(start=[0, 99]), "start must be numbers of places, below 19")],
+    ids=["start"],
 )
 def test_damaged_logs_are_refused(log: Path, tmp_path: Path, change, words: str) -> None:
     with pytest.raises(InputError) as caught:

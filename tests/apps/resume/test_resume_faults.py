@@ -58,7 +58,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, words: tuple[object, ...]) -
     return path
 
 
-@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+@pytest.mark.parametrize("share", [0.5])
 def test_a_run_that_was_cut_off_is_gone_on_with(
     whole: Path, tmp_path: Path, run: Terminal, share: float
 ) -> None:

