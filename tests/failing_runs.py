@@ -33,10 +33,7 @@ def paper_layout() -> Layout:
 
 
 def failing(
-    path: Path,
-    world: WorldName = "mujoco",
-    units: int = 4,
-    campaign: Campaign = CAMPAIGN,
+    path: Path, world: WorldName = "mujoco", units: int = 4, campaign: Campaign = CAMPAIGN
 ) -> Log:
     """The log of a run in which all of a campaign happens."""
     request = RunRequest(world, units=units, recovers=True)

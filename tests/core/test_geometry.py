@@ -9,10 +9,7 @@ import pytest
 import trimesh
 
 from factory.floor.geometry.limits import METRES
-from factory.floor.geometry.meshes import (
-    MOST_FACES,
-    usable,
-)
+from factory.floor.geometry.meshes import MOST_FACES, usable
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError

@@ -13,10 +13,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.problem.template import Law, Point
-from tests.layout_values import (
-    paper_layout,
-    random_layout,
-)
+from tests.layout_values import paper_layout, random_layout
 from tests.pag_values import TEMPLATES, catalogue, paper
 
 

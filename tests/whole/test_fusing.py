@@ -15,9 +15,7 @@ from factory.engine.simulation.simulation import Simulation
 from tests.simulation_values import layout_of, ready
 
 
-def test_the_monitor_catches_a_body_made_of_another_unit(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_monitor_catches_a_body_made_of_another_unit(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted: the product appears in the output robot's hands, but one input stays there."""
     simulation = Simulation(layout_of("paper"), RunRequest(units=2, fuse=True))
     parts, put_away = simulation.physical.parts, Holdings.put_away

@@ -129,11 +129,7 @@ def test_a_named_output_is_no_input(
 
 
 CHOSEN: list[tuple[list[str], str, str]] = [
-    (
-        ["build", "p.pag", *OPS, "-o", "."],
-        "p.pag part.obj ops/op.op",
-        "p.svg p.xml p.mjb",
-    ),
+    (["build", "p.pag", *OPS, "-o", "."], "p.pag part.obj ops/op.op", "p.svg p.xml p.mjb"),
     (["build", "plan.json", "-o", "sub"], "plan.json layout.json", "plan.json new.ways.json"),
     (
         ["revise", "p.pag", "new.pag", *OPS, "--live", "-o", "sub"],

@@ -19,10 +19,7 @@ from factory.floor.layout.durations import Pace, gear_times
 from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
 from tests.examples import without_hands
-from tests.layout_values import (
-    STYLES,
-    random_layout,
-)
+from tests.layout_values import STYLES, random_layout
 from tests.pag_values import SHAPES
 from tests.paths import PAPER
 

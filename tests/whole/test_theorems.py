@@ -13,12 +13,7 @@ from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
-from tests.net_values import (
-    fair_run,
-    glued,
-    legal_markings,
-    random_legal_marking,
-)
+from tests.net_values import fair_run, glued, legal_markings, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
 from tests.state_space import explored
 

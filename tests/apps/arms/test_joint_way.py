@@ -6,16 +6,8 @@ import numpy as np
 import pytest
 
 from factory.apps.arms.joint_way import JointWay
-from factory.apps.arms.slowness import (
-    enforce_limits,
-    tool_shares,
-)
-from tests.arm_models import (
-    ANY_TOOL_SPEED,
-    PACE,
-    random_way,
-    shipped,
-)
+from factory.apps.arms.slowness import enforce_limits, tool_shares
+from tests.arm_models import ANY_TOOL_SPEED, PACE, random_way, shipped
 
 
 def test_limits_stretch_no_more_than_they_must() -> None:

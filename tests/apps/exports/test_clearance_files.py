@@ -179,10 +179,7 @@ def one_way(ways: list[Json], machine: str, number: int) -> None:
 
 
 FORGERIES: dict[str, tuple[Callable[[Forgery], object], tuple[str, ...]]] = {
-    "spans cut to points": (
-        lambda f: f.ways(cut_all),
-        ("joint 'r1/slide'", "beyond its ways"),
-    ),
+    "spans cut to points": (lambda f: f.ways(cut_all), ("joint 'r1/slide'", "beyond its ways")),
     "the spans of one machine": (lambda f: f.ways(lambda w: cut(w, "r4", 0.5)), ("r4",)),
     "one span": (
         lambda f: f.ways(lambda w: cut(w[2:3], w[2]["machine"], 0.9)),
@@ -213,10 +210,7 @@ FORGERIES: dict[str, tuple[Callable[[Forgery], object], tuple[str, ...]]] = {
         lambda f: f.ways(lambda w: drop(w, {"r1:topped"})),
         ("'grip/r", "no machine gets it"),
     ),
-    "a body left out": (
-        lambda f: f.ways(headless),
-        ("r3 in", "'r3/head' is left out"),
-    ),
+    "a body left out": (lambda f: f.ways(headless), ("r3 in", "'r3/head' is left out")),
     "a joint that goes further": (
         lambda f: f.sub("xml", r'(name="r2/slide".*?range="\S+ )\S+"', r'\g<1>0.9"'),
         ("joint 'r2/slide'", "beyond its ways"),

@@ -7,13 +7,7 @@ from pathlib import Path
 import pytest
 
 from factory.apps.exports import exporters
-from tests.export_values import (
-    LAMP,
-    READERS,
-    kept_log,
-    project,
-    table,
-)
+from tests.export_values import LAMP, READERS, kept_log, project, table
 from tests.paths import ROOT
 
 DOCUMENT = ROOT / "docs" / "exports.md"

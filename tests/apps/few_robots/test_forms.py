@@ -8,10 +8,7 @@ from dataclasses import replace
 import pytest
 
 from factory.apps.few_robots.aim import Aim
-from factory.apps.few_robots.forms import (
-    FormsTask,
-    best_forms,
-)
+from factory.apps.few_robots.forms import FormsTask, best_forms
 from factory.apps.few_robots.lines import Admitted
 from factory.apps.few_robots.search import allocated
 from factory.floor.layout.durations import Pace

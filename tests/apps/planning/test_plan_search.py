@@ -9,12 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.apps.planning.blocking import (
-    CLASHES,
-    DEEPER,
-    LOCKED,
-    Blocking,
-)
+from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.apps.planning.cannot import interlocks, removal
 from factory.apps.planning.exact import Expected
 from factory.apps.planning.growing import Divider, bettered, divided, units_of

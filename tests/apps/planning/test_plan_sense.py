@@ -13,13 +13,7 @@ from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.titles import Titles
 from factory.apps.planning.writing import Screwed, Tree, leaves
 from factory.pipeline import all_templates
-from tests.engineered_products import (
-    MADE,
-    Engineered,
-    box,
-    rod,
-    write_stl,
-)
+from tests.engineered_products import MADE, Engineered, box, rod, write_stl
 
 TEMPLATES = all_templates()
 

@@ -13,10 +13,7 @@ from factory.theory.lang.template_reader import load_templates
 from factory.theory.problem.plan import Plan
 from factory.theory.problem.robot_types import load_catalogue
 from factory.theory.problem.template import Template
-from tests.layout_values import (
-    paper_layout,
-    row_of_inserts,
-)
+from tests.layout_values import paper_layout, row_of_inserts
 
 SETTINGS = Settings()
 
