@@ -228,8 +228,6 @@ RUNNERS: dict[str, Callable[[Any], RunVerdict]] = {
     "settings": _of_settings,
 }
 
-# --- what is done ---------------------------------------------------------------------------------
-
 
 def both(act: Callable[[Any], None]) -> Acts:
     """The same while a run goes on."""
@@ -522,7 +520,6 @@ roof = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.06 ) );
 floor = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, -0.06 ) )"""
 """A box that is closed before its core comes in, 35 mm deep through a wall."""
 
-# --- the table ------------------------------------------------------------------------------------
 
 TABLE: dict[str, dict[str, tuple[str, Any]]] = {
     "engine": {

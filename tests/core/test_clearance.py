@@ -30,9 +30,6 @@ def broken(layout: Layout, *words: str) -> Certificate:
     return found
 
 
-# --- it holds -------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("drawn", DRAWN, ids=str)
 def test_every_layout_is_clear(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
@@ -65,9 +62,6 @@ def test_coupled_regions_belong_to_the_operation_that_takes_the_payload() -> Non
         assert region.label in operation.before
 
 
-# --- planted faults -------------------------------------------------------------------------------
-
-
 def test_a_fault_says_where_and_by_how_much() -> None:
     found = certify(shortened(paper_layout(), 4, 0.012))
     fault = next(fault for fault in found.faults if set(fault.robots) == {"r5", "r3"})
@@ -96,6 +90,3 @@ def test_guidepaths_that_cross_or_leave_the_grid() -> None:
     broken(with_path(layout, 5, a=(x - 0.2, y)), "the guidepaths of r5 and r6 cross at")
     across = with_path(layout, 3, travel=-0.4)
     broken(across, "the guidepaths of r3 and r4 cross at")
-
-
-# --- as short as clearance allows, and in linear time --------------------------------------------

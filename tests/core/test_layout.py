@@ -30,12 +30,6 @@ def test_stretching_changes_lengths_alone() -> None:
     assert [p.heading for p in near.guidepaths] == [p.heading for p in far.guidepaths]
 
 
-# --- floors ---------------------------------------------------------------------------------------
-
-
-# --- templates ------------------------------------------------------------------------------------
-
-
 def test_three_guests_at_one_point_are_refused() -> None:
     clamp = TEMPLATES["clamp"]
     press = replace(

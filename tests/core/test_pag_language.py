@@ -46,9 +46,6 @@ def part(arguments: str) -> tuple[Parameter, ...]:
     return read(f"root = p; p = atomic ( {arguments} )")["p"].parameters
 
 
-# What is accepted
-
-
 def test_mate_takes_two_or_more_and_insert_two() -> None:
     parts = "; ".join(f"p{i} = atomic()" for i in range(8))
     inputs = ", ".join(f"p{i}" for i in range(8))
@@ -56,8 +53,6 @@ def test_mate_takes_two_or_more_and_insert_two() -> None:
     assert read("root = a; a = insert ( b, c ); b = atomic(); c = atomic()")
     assert codes(f"root = a; a = insert ( {inputs} ); {parts}") == ["WrongInputs"]
 
-
-# Units, colours, copies
 
 SCREWS = """unit = mm; root = all; all = mate ( plate, screw ); plate = atomic ( box = (6, 6, 4) );
 screw[2] = atomic ( cylinder = (1.5, 10), quat = (2, 0, 0, 0), mass = 3 ) at ( 10, -7, 0.3 ),
@@ -113,9 +108,6 @@ def test_copies_are_parts_of_their_own() -> None:
     assert "name it once" in found.hint
 
 
-# The writer
-
-
 @given(pags(20, meshes=("bricks/3001.obj",)))
 def test_read_after_write_is_the_identity(pag: PAG) -> None:
     text = write_pag(pag)
@@ -129,9 +121,6 @@ def test_a_text_of_several_lines_cannot_be_written() -> None:
     node = pag.nodes[0]
     with pytest.raises(ValueError, match="one line"):
         write_pag(PAG("p", (type(node)("p", "atomic", (), (Parameter("mesh", "a\nb"),)),)))
-
-
-# What is refused: the corpus
 
 
 @pytest.mark.parametrize("path", sorted(BROKEN.glob("*.pag")), ids=lambda path: path.stem)
@@ -164,9 +153,6 @@ def test_bad_geometry_is_found_at_the_value(name: str, bad: str) -> None:
     assert start <= found[0].position.column < start + len(bad)
 
 
-# What is refused: files
-
-
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     (tmp_path / "product.pag").write_text(PAPER)
     assert load_pag(tmp_path / "product.pag", TEMPLATES) == read(PAPER)
@@ -177,12 +163,6 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         assert caught.value.diagnostics[0].hint
     with pytest.raises(InputError, match=r"did you mean '.*product.pag'"):
         load_pag(tmp_path / "produkt.pag", TEMPLATES)
-
-
-# No text whatever gives anything but an InputError
-
-
-# Size
 
 
 def test_templates_of_the_session(templates: Mapping[str, object]) -> None:

@@ -31,9 +31,6 @@ def codes(text: str) -> list[str]:
     return [diagnostic.code for diagnostic in errors(text)]
 
 
-# What is accepted
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -72,9 +69,6 @@ def test_geometry() -> None:
     assert codes(text.replace("= geometry", "= geometry and ( mass = 1 )")) == ["BadTemplate"]
 
 
-# Failures
-
-
 def test_failures() -> None:
     text = (
         MATE + "failure = { residual > 5e-4 : again 2 then scrap, lost : stop, jammed : again 3 };"
@@ -91,18 +85,12 @@ def test_failures() -> None:
     assert template.failure("rejected") is None
 
 
-# The writer
-
-
 @given(random_templates())
 def test_read_after_write_is_the_identity(template: Template) -> None:
     text = write_template(template)
     again = read_template(text)
     assert again == template
     assert write_template(again) == text
-
-
-# The shipped templates
 
 
 def test_what_is_shipped() -> None:
@@ -137,9 +125,6 @@ def test_shipped_files_say_what_they_are(path: Path) -> None:
     assert read_template(path.read_text(encoding="utf-8")).name == path.stem
 
 
-# Folders
-
-
 def put(folder: Path, name: str, text: str) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / name).write_text(text, encoding="utf-8")
@@ -169,9 +154,6 @@ def test_all_errors_of_all_files_come_at_once(tmp_path: Path) -> None:
     assert all(d.hint for d in caught.value.diagnostics)
 
 
-# What is refused
-
-
 @pytest.mark.parametrize("path", sorted(BROKEN.glob("*.op")), ids=lambda path: path.stem)
 def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
     with pytest.raises(InputError) as caught:
@@ -180,9 +162,6 @@ def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
         assert diagnostic.position is not None
         assert diagnostic.hint
     golden(f"broken/{path.name}.txt", f"{caught.value}\n")
-
-
-# No text whatever gives anything but an InputError
 
 
 WORDS = 'R j ~ < a ; b > F where = ( ) { } , "x" " // \n A1 + 2r on W to within for and eps LAB1 3'

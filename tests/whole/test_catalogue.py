@@ -27,9 +27,6 @@ ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8"
 EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
 
 
-# --- templates ------------------------------------------------------------------------------------
-
-
 def smallest_product(template: Template) -> str:
     """A PAG that needs the template: parts, one operation, and a weld to take its product on."""
     if template.geometry:
@@ -61,9 +58,6 @@ def test_templates_run(file: Path, world: str) -> None:
         assert_good(run)
 
 
-# --- robot types ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ROBOTS)
 def test_robot_types_load(name: str) -> None:
     """Alone in stock MuJoCo, with the joint and the actuator that every type has."""
@@ -92,9 +86,6 @@ def test_templates_ask_for_robots_that_exist() -> None:
     assert wanted <= set(ROBOTS)
 
 
-# --- exporters ------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a run of the paper's example."""
@@ -115,9 +106,6 @@ def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> N
     one, other = (files_in(tmp_path / name) for name in ("one", "other"))
     assert any(one.values())
     assert one == other
-
-
-# --- examples -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)

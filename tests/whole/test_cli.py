@@ -14,8 +14,6 @@ from factory.commands import commands
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
 
-# --- the documents --------------------------------------------------------------------------------
-
 
 def test_programs_export_templates_doctor(run: Terminal, tmp_path: Path) -> None:
     programs = run("programs", PAPER, "--json").json["programs"]
@@ -88,12 +86,3 @@ def test_people_get_a_summary(run: Terminal) -> None:
     assert "more robot" not in out  # six are all that there are
     assert "live: yes" in run("check", PAPER).out
     assert len(run("templates", "-v").out) > len(run("templates").out)
-
-
-# --- diagnostics ----------------------------------------------------------------------------------
-
-
-# --- proofs ---------------------------------------------------------------------------------------
-
-
-# --- templates ----------------------------------------------------------------------------------

@@ -31,8 +31,6 @@ def commands(folder: Path) -> list[list[object]]:
     ]
 
 
-# --- what libraries say ---------------------------------------------------------------------------
-
 WARNS = """
 import numpy
 from factory import commands
@@ -49,9 +47,6 @@ def test_warnings_of_libraries_are_for_programmers() -> None:
     ]
     assert [done.returncode for done in said] == [0, 0]
     assert said[0].stderr == "" and "RuntimeWarning" in said[1].stderr
-
-
-# --- broken files ---------------------------------------------------------------------------------
 
 
 def garbage() -> dict[str, bytes]:
@@ -88,11 +83,6 @@ def test_garbage(run: Terminal, out: Path, name: str) -> None:
         assert done.codes
     assert files_in(out) == {}
 
-
-# --- options --------------------------------------------------------------------------------------
-
-
-# --- outputs --------------------------------------------------------------------------------------
 
 OUTPUTS = [
     ["build", "--mjcf"],

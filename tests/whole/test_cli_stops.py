@@ -15,8 +15,6 @@ from tests.command_line import Terminal, spawn_each
 from tests.core.test_progress import STOPPED, stopped
 from tests.paths import PAPER, ROOT, files_in
 
-# --- a run that fails, or is stopped --------------------------------------------------------------
-
 
 @pytest.mark.parametrize(
     ("geometry", "status"),
@@ -52,8 +50,6 @@ def test_a_film_that_is_stopped_in_its_first_frame_leaves_no_file(
     assert run("render", PAPER, "-o", film, "--size", "64x48").status == 130
     assert list(out.iterdir()) == []
 
-
-# --- what a machine may lack ----------------------------------------------------------------------
 
 WITHOUT_GL = {
     "bogus": {"MUJOCO_GL": "bogus"},

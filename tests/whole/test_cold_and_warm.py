@@ -91,9 +91,6 @@ def imported(*words: object, cache: Path) -> set[str]:
     return set(done.stderr.split())
 
 
-# --- nothing new --------------------------------------------------------------------------------
-
-
 def test_the_tables_of_a_grammar_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def read() -> Any:
         parser = open_grammar("pag.lark", ["start", "unlawful"], pag_syntax._Builder())
@@ -123,9 +120,6 @@ def test_a_mesh_that_changed_is_measured_again(
     assert work["measured"] == 3
 
 
-# --- the cache ----------------------------------------------------------------------------------
-
-
 def test_a_cache_that_cannot_be_written_is_no_error(run: Terminal, file: Path) -> None:
     (file.parent / "cache").write_text("a file where the folder should be")
     assert run("check", file).status == 0
@@ -141,9 +135,6 @@ def test_the_oldest_entries_go_where_they_are_too_many(
     assert load("some", "a") == bytes(8000)  # so it is no longer the oldest
     store("some", "d", bytes(8000))
     assert sorted(path.stem for path in (cache / "some").iterdir()) == ["a", "c", "d"]
-
-
-# --- what is loaded -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -187,9 +178,6 @@ def test_boxes_are_checked_without_libraries_of_meshes(tmp_path: Path, cache: Pa
     assert "numpy" in found and not found & set(ENGINES)
     kept = [folder.name for folder in cache.iterdir()]
     assert kept == ["grammars"]  # what is computed at once is not kept
-
-
-# --- what is done without a library does what the library does -----------------------------------
 
 
 def printed_table(*table: Any) -> str:

@@ -22,9 +22,3 @@ def test_there_is_room_for_so_many_numbers(monkeypatch: pytest.MonkeyPatch) -> N
         again = cache.course(number % 7, lambda: pytest.fail("it was forgotten"))
         assert again is course
         assert 1 <= len(cache._courses) <= 42 // 16
-
-
-# --- what drives read -----------------------------------------------------------------------------
-
-
-# --- courses that are cut short -------------------------------------------------------------------

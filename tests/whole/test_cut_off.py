@@ -84,9 +84,6 @@ def assert_told(run: Terminal, log: Path, html: Path) -> None:
     assert not any("✓ follows the net" in text for text in words)
 
 
-# --- how a run may end ----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("number", [signal.SIGINT], ids=lambda n: n.name)
 def test_a_signal(run: Terminal, out: Path, number: signal.Signals) -> None:
     log = out / "run.log"
@@ -115,9 +112,6 @@ def test_an_error_of_another_observer(out: Path) -> None:
         simulation.run([writer.observe, fail])
     assert read_log(log).complete
     assert (cut_off(log).code, cut_off(log).message) == ("Internal", "RuntimeError: no more")
-
-
-# --- files that end too early ---------------------------------------------------------------------
 
 
 KILLED_AT_ONCE = """
@@ -152,9 +146,6 @@ def test_a_run_killed_in_its_first_second_is_not_of_the_ideal_world(
     assert list(files_in(out)) == ["run.log"]
 
 
-# --- one file, one run ----------------------------------------------------------------------------
-
-
 def test_two_runs_do_not_write_one_film(out: Path) -> None:
     path = out / "a.mp4"
     pixels = np.zeros((48, 64, 3), np.uint8)
@@ -173,9 +164,6 @@ def test_what_is_no_file_is_not_claimed(out: Path) -> None:
         with claimed(Path("/dev/null")) as one, claimed(Path("/dev/null")) as other:
             assert one.write(b"a") == other.write(b"b") == 1
     assert not is_claimed(Path("/dev/null")) and not is_claimed(out / "nothing")
-
-
-# --- full disks -----------------------------------------------------------------------------------
 
 
 def with_room(room: int, *words: object) -> subprocess.CompletedProcess[str]:
@@ -226,9 +214,6 @@ def test_a_device_without_room_is_named(run: Terminal) -> None:
             said = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
         assert said.returncode == 2
         assert said.stderr.startswith("BadFile what is printed: No space left on device\n")
-
-
-# --- the demo -------------------------------------------------------------------------------------
 
 
 def test_the_demo_leaves_the_checkout_clean() -> None:

@@ -53,9 +53,6 @@ def simulated(word: Sequence[str], world: str = "mujoco", **asked: object) -> Si
     return Simulation(little().layout, RunRequest(**values))  # type: ignore[arg-type]
 
 
-# The word
-
-
 def test_a_word_is_a_subsequence_of_the_units_of_the_net() -> None:
     word = Word(("a", "a", "b"), ordered("bbab"), 4)
     assert [word.makes(unit) for unit in range(3)] == [False, False, True]
@@ -142,9 +139,6 @@ def test_no_word_stops_the_net(seed: int, wip: int | None) -> None:
     assert wip is None or ahead <= wip - 1
 
 
-# Runs
-
-
 def test_the_sequence_can_be_given(run: Terminal, tmp_path: Path) -> None:
     file = tmp_path / "little.pag"
     file.write_text(LITTLE)
@@ -180,9 +174,6 @@ def test_what_is_lost_is_made_again_for_its_unit(world: str) -> None:
     assert run.word == tuple("babab")
 
 
-# Planted faults
-
-
 def failed(simulation: Simulation) -> set[str]:
     run: Run = watched(simulation, max_time=80.0)
     assert not run.succeeded
@@ -209,9 +200,6 @@ def test_a_robot_that_rests_in_the_way_is_refused(monkeypatch: pytest.MonkeyPatc
     with pytest.raises(InputError) as caught:
         on_demand(layout)
     assert {fault.code for fault in caught.value.diagnostics} == {"Layout"}
-
-
-# Files
 
 
 @pytest.mark.parametrize(

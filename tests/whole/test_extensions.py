@@ -105,9 +105,6 @@ def test_a_folder_that_is_not_there(run: Terminal, tmp_path: Path) -> None:
     assert "Usage" in done.err and "give a folder with modules" in done.err
 
 
-# --- packages -------------------------------------------------------------------------------------
-
-
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A package as if it were installed: its folder, and the metadata beside it, are found."""

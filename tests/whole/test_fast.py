@@ -14,15 +14,6 @@ def _neighbours_in_small_factories_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neighbours, "FEW", 0)
 
 
-# --- contacts, pushes and disturbances ------------------------------------------------------------
-
-
-# --- going back -----------------------------------------------------------------------------------
-
-
-# --- how many ticks go to the engine --------------------------------------------------------------
-
-
 def test_no_more_is_simulated_than_was_asked_for() -> None:
     run = ready("paper", units=5).run(max_time=1.23)
     assert run.sim_time_s == pytest.approx(1.23) and run.trouble is not None

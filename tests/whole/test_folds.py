@@ -56,9 +56,6 @@ def judged(net: GearNet | MarkedNet) -> tuple[bool | None, ...]:
     return found.live, found.safe, found.reversible
 
 
-# --- Theorem 2 -----------------------------------------------------------------------------------
-
-
 def folds_are_live(seeds: range, size: int) -> tuple[int, int]:
     """How many of these random folds have robots with several tours, and how many were explored."""
     shared = small = 0
@@ -158,9 +155,6 @@ def without_waits() -> MarkedNet:
     return MarkedNet(net.net, net.tokens).with_gears(gears)
 
 
-# --- certificates --------------------------------------------------------------------------------
-
-
 def certified(net: GearNet | MarkedNet) -> Json:
     found: Json = json.loads(json.dumps(certificate(net, verify(net))))
     return found
@@ -227,9 +221,6 @@ def test_a_missing_wait_is_refused() -> None:
     assert "gear_train: r1 has no wait of its own before each operation" in faults
 
 
-# --- markings ------------------------------------------------------------------------------------
-
-
 def test_of_fifty_legal_markings_of_three_robots_24_are_dead() -> None:
     net = three_robots().net
     markings = legal_markings(net)
@@ -262,9 +253,6 @@ def test_what_the_error_says() -> None:
     assert found.hint == "say where each of r1, r2, r3 is"
 
 
-# --- cycle times ---------------------------------------------------------------------------------
-
-
 def test_a_bottleneck_of_two_robots() -> None:
     """From sub1 to sub3 with r1, and from there with r2: longer than the gear of either."""
     factory = three_robots()
@@ -279,9 +267,6 @@ def test_a_bottleneck_of_two_robots() -> None:
 def test_a_dead_train_has_no_cycle_time() -> None:
     with pytest.raises(ValueError, match="live"):
         cycle_time(_dead(), {})
-
-
-# --- what is no fold, and programs ---------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

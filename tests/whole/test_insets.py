@@ -42,9 +42,6 @@ def model_of(layout: Layout, overlap: float = 0.5 * MM, fuse: bool = False) -> M
     return physical_model(layout, 1, replace(Settings(), overlap=overlap), fuse=fuse)
 
 
-# --- faces that recede ------------------------------------------------------------------------
-
-
 def _ball(vertices: np.ndarray) -> float:
     return _largest_ball(*_faces(vertices))[1]
 
@@ -59,15 +56,9 @@ def test_the_largest_ball_in_a_body() -> None:
     assert corners == {(x, y, z) for x in (-9, 9) for y in (-19, 19) for z in (-29, 29)}
 
 
-# --- the model --------------------------------------------------------------------------------
-
-
 def test_what_is_too_thin_to_become_smaller_is_left_out() -> None:
     thin = PRESSED.replace("(0.04, 0.04, 0.04), pos = (0, 0,", "(0.04, 0.04, 0.0005), pos = (0, 0,")
     assert insets_of(laid_out(thin), 0.5 * MM).excluded == (("a", "b"),)
-
-
-# --- runs -------------------------------------------------------------------------------------
 
 
 def touching_parts(world: MujocoWorld) -> set[tuple[str, ...]]:
@@ -134,9 +125,6 @@ def test_in_fused_runs_pairs_are_left_out_part_by_part() -> None:
         for pair in d.contact.geom[d.contact.dist < 0]
     }
     assert {pair for pair in seen if {*pair} <= {*"abcd"}} == {("c", "d")}
-
-
-# --- what is told -----------------------------------------------------------------------------
 
 
 def test_a_run_says_how_many_pairs_it_did_not_test(run: Terminal, tmp_path: Path) -> None:

@@ -37,9 +37,6 @@ def written(folder: Path, text: str) -> Path:
     return path
 
 
-# --- the language ---------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("statement", "code", "words"),
     [
@@ -78,12 +75,6 @@ def test_a_manipulator_needs_a_hand(cell: Layout) -> None:
         Simulation(layout, RunRequest())
 
 
-# --- the turned part ------------------------------------------------------------------------------
-
-
-# --- the layout -----------------------------------------------------------------------------------
-
-
 def test_the_net_keeps_who_brings_and_who_takes_away_apart(cell: Layout) -> None:
     """The robot that brings the peg, and the carrier under the same tool: a checker that knows only
     MJCF, ways and circuits finds nothing, and finds the pair where its circuits are left out."""
@@ -98,9 +89,6 @@ def test_the_net_keeps_who_brings_and_who_takes_away_apart(cell: Layout) -> None
     assert len(kept) < len(clearance["excluded"])
     faults = check(m, machines, {**clearance, "excluded": kept})
     assert any("part/base" in fault and "r3/" in fault for fault in faults), faults
-
-
-# --- the run --------------------------------------------------------------------------------------
 
 
 def test_a_manipulator_is_exported(run: Terminal, tmp_path: Path) -> None:

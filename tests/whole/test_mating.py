@@ -97,9 +97,6 @@ def one(found: Matings, label: str = "") -> Mating:
     return next(m for m in found.all if label in ("", m.label))
 
 
-# --- hand-made cases --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("axis", "text", "kind"),
     [(1, ALONG_Y, "slide"), (0, ALONG_X, "slide"), (0, ALONG_Y, "blocked")],
@@ -136,15 +133,6 @@ def test_planted_fault_something_is_in_the_way_by_a_hair(by: float, level: int) 
     peg = [block((-7, 7), (-20, 20), (-7, 7)), block((-8 - by, 0), (6, 20), (-7, 7))]
     peg.append(block((-8 - by, 0), (-20, -6), (-7, 7)))
     assert one(judged(ALONG_Y, a=plate(8, 1), b=peg)).slide == level
-
-
-# --- the axes, and where parts meet -----------------------------------------------------------
-
-
-# --- products with no shapes of their own -----------------------------------------------------
-
-
-# --- the depth of a path ----------------------------------------------------------------------
 
 
 def convex_pair(seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -248,8 +236,6 @@ def test_few_facets_of_fine_bodies_are_looked_at(monkeypatch: pytest.MonkeyPatch
     assert depth == pytest.approx(0.01, abs=1e-4)  # the radii along x are 0.04 together
     assert sum(looked) < 500
 
-
-# --- check ------------------------------------------------------------------------------------
 
 CLOSED = """root = r;
 r = mate ( a, b );

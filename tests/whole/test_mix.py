@@ -40,9 +40,6 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-# The language
-
-
 def test_a_mix_counts_its_products_or_orders_them() -> None:
     assert little().mix == Mix((("a", 2), ("b", 1)))
     assert little("mix = b, a, a").mix == Mix((("b", 1), ("a", 2)), ("b", "a", "a"))
@@ -91,9 +88,6 @@ def test_a_word_that_is_no_mix_is_one_error() -> None:
         with pytest.raises(InputError) as caught:
             little(mix)
         assert [d.code for d in caught.value.diagnostics] == ["Syntax"]
-
-
-# The net
 
 
 @cache
@@ -165,9 +159,6 @@ def test_a_plan_makes_a_product_wholly_or_not_at_all() -> None:
         _ = project.with_plan(Plan(turns=((NOBODY,) * len(unit),))).planned
 
 
-# Geometry
-
-
 def test_default_boxes_are_side_by_side_in_each_product() -> None:
     """Boxes of two products may be in one place, those of one never are."""
     pag = little()
@@ -217,9 +208,6 @@ def test_an_analysis_says_how_long_each_product_takes(shaped: Path, run: Termina
     assert run("analyze", "examples/paper.pag", "--json").json["by_product_s"] == {}
 
 
-# From end to end
-
-
 LAMPS = """unit = mm; mix = 2 shaded, 1 bare;
 shaded = mate ( base, shade ); bare = mate ( base, globe );
 base = atomic ( box = (40, 40, 20), pos = (0, 0, 10) );
@@ -263,9 +251,6 @@ def test_a_search_says_what_keeps_robots_of_a_mix_apart(tmp_path: Path, run: Ter
     )
     refused = run("check", file, "--robots", 2, "--json").json["errors"][0]["message"]
     assert "; 'y' and 'base' cannot share a robot: they begin or end in different ways" in refused
-
-
-# The sequence
 
 
 def test_the_sequences_of_a_mix_are_its_necklaces() -> None:

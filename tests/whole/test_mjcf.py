@@ -77,9 +77,6 @@ def shapes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Layout, mujoco.MjM
     return layout, compiled(physical_model(layout, 1, Settings(timestep=0.002)), folder)
 
 
-# --- the file -------------------------------------------------------------------------------------
-
-
 def test_the_papers_example_to_the_letter(
     paper: Layout, golden: Callable[[str, str], None]
 ) -> None:
@@ -101,9 +98,6 @@ def test_odd_names_stay_in_their_folder(run: Terminal, tmp_path: Path, name: str
     assert len(meshes_of_parts(mujoco.MjModel.from_xml_path(done.json["mjcf"]))) == 1
 
 
-# --- what is in it --------------------------------------------------------------------------------
-
-
 def test_what_the_engine_refuses_is_named(tmp_path: Path) -> None:
     model = physical_model(laid_out(tmp_path / "p.pag", "root = a; a = atomic(sphere = 0.01)"), 1)
     with pytest.raises(InputError) as caught:
@@ -111,9 +105,6 @@ def test_what_the_engine_refuses_is_named(tmp_path: Path) -> None:
     (found,) = caught.value.diagnostics
     assert (found.code, found.hint) == ("BadValue", "give it another shape or mass")
     assert found.position and found.position.column == 11
-
-
-# --- how it behaves -------------------------------------------------------------------------------
 
 
 def test_parts_of_every_shape_stand_still(shapes: tuple[Layout, mujoco.MjModel]) -> None:

@@ -39,12 +39,6 @@ def boxes(m: mujoco.MjModel, d: mujoco.MjData, bodies: np.ndarray) -> np.ndarray
     return np.asarray(found[bodies])
 
 
-# --- what is pushed, touched or off its way -------------------------------------------------------
-
-
-# --- boxes ----------------------------------------------------------------------------------------
-
-
 def within_boxes(simulation: Simulation) -> bool:
     """Whether all that holders have is within the boxes that they are to sweep."""
     world = simulation.physical
@@ -65,6 +59,3 @@ def test_what_a_holder_has_is_within_its_box(name: str, given: dict[str, Any]) -
         for _ in range(10):
             simulation.supervisor.step()
         assert within_boxes(simulation)
-
-
-# --- planted faults -------------------------------------------------------------------------------

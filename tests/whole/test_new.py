@@ -16,8 +16,6 @@ from factory.support.user_defaults import OPTIONS, load_defaults
 from tests.command_line import Terminal, spawn
 from tests.paths import PAPER, files_in
 
-# --- factory new ----------------------------------------------------------------------------------
-
 
 def test_its_factory_toml_tells_every_key_and_its_default(run: Terminal, tmp_path: Path) -> None:
     """All are commented out; without the comment signs they change nothing."""
@@ -44,9 +42,6 @@ def test_what_is_there_is_left_alone(run: Terminal, tmp_path: Path) -> None:
     (tmp_path / "c").symlink_to(tmp_path / "nowhere")
     assert run("new", tmp_path / "c", "--json").codes == ["BadFile"]
     assert {k: v for k, v in files_in(tmp_path).items() if k != "b"} == before
-
-
-# --- defaults -------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -84,9 +79,6 @@ def test_each_command_takes_what_it_has_an_option_for(
     assert run("check", pag, "-q").status == 0
     pag.with_name("factory.toml").unlink()
     assert run("check", pag, "--json").codes == ["UnknownParameter"]
-
-
-# --- completion in the shell ----------------------------------------------------------------------
 
 
 Completions = Callable[[str], list[str]]

@@ -21,6 +21,3 @@ def test_the_generator_writes_the_same_bytes(tmp_path: Path) -> None:
     assert len(made) == len(kept) > 0
     for path in tmp_path.rglob("*.obj"):
         assert path.read_bytes() == (EXAMPLES / path.relative_to(tmp_path)).read_bytes(), path.name
-
-
-# --- the engine's own eyes ------------------------------------------------------------------------

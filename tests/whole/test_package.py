@@ -24,8 +24,6 @@ from tests.opengl import needs_gl
 from tests.paths import PAPER, ROOT
 from tests.plan_puzzles import pinwheel, source
 
-# --- values are checked when made, with the codes of the command line -----------------------------
-
 WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
     (lambda p: factory.run(p, world="moojoco"), ("run", PAPER, "--world", "moojoco")),
     (lambda p: factory.run(p, units=-1), ("run", PAPER, "--units", -1)),
@@ -122,9 +120,6 @@ def test_what_is_no_product_is_told() -> None:
         factory.run(42)  # type: ignore[arg-type]
 
 
-# --- the functions do what the commands do --------------------------------------------------------
-
-
 def test_every_stage_gives_the_same_run() -> None:
     pag = factory.load_pag(PAPER)
     plan = factory.compile(pag)
@@ -171,9 +166,6 @@ def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True)
     assert done.stdout.decode().split() == ["begun", "2"], done.stderr.decode()
-
-
-# --- values show themselves -----------------------------------------------------------------------
 
 
 def test_values_are_shown_in_a_line_and_as_a_picture() -> None:
@@ -230,9 +222,6 @@ def test_what_is_too_large_is_not_drawn(tmp_path: Path) -> None:
     assert factory.compile(pag)._repr_svg_() is None
 
 
-# --- the notebook ---------------------------------------------------------------------------------
-
-
 def cells() -> list[str]:
     """The code of the notebook, cell by cell; it has no outputs."""
     document = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))
@@ -260,8 +249,6 @@ def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (names["folder"] / "paper.png").stat().st_size > 10_000
     shutil.rmtree(names["folder"])
 
-
-# --- types ----------------------------------------------------------------------------------------
 
 SCRIPT = """
 import factory
@@ -309,9 +296,6 @@ def test_types_reach_the_script_of_a_user(tmp_path: Path) -> None:
     assert any("arg-type" in line and "Literal" in line for line in lines)
     assert any('Unexpected keyword argument "unit"' in line for line in lines)
     assert (ROOT / "factory" / "py.typed").is_file()
-
-
-# --- the other package of this name ---------------------------------------------------------------
 
 
 def installed(folder: Path, files: dict[str, str]) -> dict[str, str]:

@@ -61,9 +61,6 @@ def truth(factory: Factory, limit: int = 150_000) -> tuple[bool, bool, bool]:
     return found.behaviour
 
 
-# --- the net -------------------------------------------------------------------------------------
-
-
 def test_one_branch_changes_nothing() -> None:
     factory = plain(slow())
     assert in_parallel(factory, (("sub2", 1),)) is factory.plan
@@ -112,9 +109,6 @@ def test_what_has_no_branch_of_its_own(label: str, words: str, hint: str) -> Non
     assert hint in diagnostic.hint
 
 
-# --- layout and runs -----------------------------------------------------------------------------
-
-
 @cache
 def project(k: int) -> Project:
     """That product with so many branches."""
@@ -139,9 +133,6 @@ def test_a_part_in_the_wrong_branch_is_found() -> None:
     welds[one], welds[other] = welds[other], welds[one]
     run = watched(simulation, max_time=15.0, every_tick=True)
     assert not run.succeeded and not run.refines_net
-
-
-# --- commands ------------------------------------------------------------------------------------
 
 
 TEXT = """root = sub3;

@@ -46,23 +46,11 @@ def hull_volume(points: Array) -> float:
     return float(trimesh.convex.convex_hull(points).volume)
 
 
-# --- primitives -----------------------------------------------------------------------------------
-
-
-# --- meshes ---------------------------------------------------------------------------------------
-
-
 def test_one_body_that_is_not_convex_spoils_it(tmp_path: Path) -> None:
     tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
     block = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((0.3, 0, 0))
     solid = solid_of(tmp_path, trimesh.util.concatenate([tube, block]))
     assert solid.mesh is not None and len(solid.mesh.pieces) != 2
-
-
-# --- bodies that touch ---------------------------------------------------------------------------
-
-
-# --- decomposition --------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -273,6 +261,3 @@ def test_the_real_library_starts_no_threads() -> None:
     thread.start()
     thread.join()
     assert len(found) == len(before) + 1
-
-
-# --- in the engine --------------------------------------------------------------------------------

@@ -57,9 +57,6 @@ def with_text(text: str, folder: Path, **ground: Any) -> Project:
     return read(folder / "p.pag", (), ground=Ground(**ground))
 
 
-# --- values and tables ----------------------------------------------------------------------------
-
-
 VARIANTS: dict[str, Callable[[Path], Project]] = {
     "written": lambda folder: read(PAPER),
     "lamp": lambda folder: read(EXAMPLES / "lamp.pag"),
@@ -105,12 +102,6 @@ def test_a_broken_table_has_its_lesson(key: str, value: Any, words: str) -> None
 @cache
 def written() -> Project:
     return read(EXAMPLES / "truck.pag")
-
-
-# --- logs -----------------------------------------------------------------------------------------
-
-
-# --- files ----------------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -59,8 +59,6 @@ def with_type(text: str, folder: Path, extends: str = "dot") -> Project:
     return Project(load_pag(PAPER, templates), templates, Catalogue(types))
 
 
-# --- what is read ---------------------------------------------------------------------------------
-
 side = st.floats(0.002, 0.2).map(lambda value: round(value, 4))
 place = st.floats(-0.05, 0.05).map(lambda value: round(value, 4))
 mass = st.floats(0.001, 50).map(lambda value: round(value, 3))
@@ -149,9 +147,6 @@ def test_what_cannot_differ_is_refused_at_its_line(
     assert all(d.hint.startswith("valid: ") for d in found)
 
 
-# --- what is laid out -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("drive", "why"),
     [
@@ -166,9 +161,6 @@ def test_a_drive_that_cannot_follow_is_refused(tmp_path: Path, drive: str, why: 
     first = caught.value.diagnostics[0]
     assert first.code == "BadRobot" and why in first.message, first
     assert first.position is not None and first.position.line == 36
-
-
-# --- what runs ------------------------------------------------------------------------------------
 
 
 @pytest.fixture

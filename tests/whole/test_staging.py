@@ -35,9 +35,6 @@ def paper() -> Layout:
     return laid_out(PAPER)
 
 
-# --- the pace -------------------------------------------------------------------------------------
-
-
 def test_the_bound_is_one_for_staged_robots(paper: Layout) -> None:
     """The paper's example comes near it, as it does without."""
     for chosen in (STILL, STAGED):
@@ -58,12 +55,6 @@ def test_ways_in_the_timed_net(paper: Layout) -> None:
     for _, number in net.ways:
         end = timing.factory.operations[number].end
         assert net.firings(1)[0, end] < 50.0 <= late.firings(1)[0, end]
-
-
-# --- robots on their way --------------------------------------------------------------------------
-
-
-# --- planted faults -------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

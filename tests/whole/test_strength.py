@@ -56,8 +56,6 @@ def weaken(monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
     monkeypatch.setattr(gauges, "tip", weak)
 
 
-# --- what a load is -------------------------------------------------------------------------------
-
 SCENE = """<mujoco><option timestep="0.002" gravity="0 0 -9.81"/><worldbody>
   <body name="hand"><joint type="slide" axis="1 0 0" armature="100"/>
     <geom type="sphere" size="0.01" mass="1" contype="0" conaffinity="0"/></body>
@@ -87,8 +85,6 @@ def test_the_rows_of_a_weld_are_the_load_on_its_holder() -> None:
     np.testing.assert_allclose(load, -exact[1:7], atol=1e-3 * np.abs(load).max())
 
 
-# --- honest runs ----------------------------------------------------------------------------------
-
 LARGE = [pytest.param(name, marks=pytest.mark.slow) for name in ("truck", "chair", "gearbox")]
 
 
@@ -116,9 +112,6 @@ def test_hands_bear_what_was_predicted(name: str, monkeypatch: pytest.MonkeyPatc
         assert hand is not None
         assert most[robot] <= hand.share + 1e-3, robot
         assert most[robot] >= 0.45 * hand.share, robot
-
-
-# --- planted faults -------------------------------------------------------------------------------
 
 
 def dropped(run: Run, robot: str, label: str) -> None:
@@ -154,6 +147,3 @@ def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> N
         session.run(observe)
     assert session.frame.note.startswith("r3 drops 'sub1' at ")
     assert session.frame.note.endswith(": restart it")
-
-
-# --- what is said ---------------------------------------------------------------------------------

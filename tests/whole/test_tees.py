@@ -65,9 +65,6 @@ def carried_out(layout: Layout, units: int = 10, **more: object) -> Run:
     return watched(Simulation(layout, request), every_tick=True)
 
 
-# --- which robots share a stem -------------------------------------------------------------------
-
-
 def test_the_factory_on_stems_is_that_of_one_branch_unit_by_unit() -> None:
     """With each operation where it was, its net live."""
     factory = branched(plain(paper()), ("sub2", 2))
@@ -77,9 +74,6 @@ def test_the_factory_on_stems_is_that_of_one_branch_unit_by_unit() -> None:
     for one, other in zip(factory.operations, stems.operations, strict=True):
         assert (one.label, tuple(place[r] for r in one.robots)) == (other.label, other.robots)
     assert [len(tours) for tours in stems.tours] == [2] * len(stems.robots)
-
-
-# --- the layout ----------------------------------------------------------------------------------
 
 
 def on_stem(layout: Layout) -> tuple[int, int]:
@@ -103,9 +97,6 @@ def test_a_short_arm_is_found() -> None:
     certificate = certify(replace(layout, guidepaths=tuple(paths), visits=visits))
     assert any("come" in fault.message or "apart" in fault.message for fault in certificate.faults)
     assert not certificate.holds and other
-
-
-# --- runs ----------------------------------------------------------------------------------------
 
 
 def test_logs_and_plans_keep_bends(run: Terminal, tmp_path: Path) -> None:

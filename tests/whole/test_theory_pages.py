@@ -73,9 +73,6 @@ def test_the_order_places_exclude_by_one_token() -> None:
     assert excluding(net_from(gears), [(0, 2)]) == [None]
 
 
-# --- what pages say -------------------------------------------------------------------------------
-
-
 def test_the_redistribution_function_on_the_page_is_that_of_the_net() -> None:
     page = (THEORY / "threaded.md").read_text("utf-8")
     rows = re.findall(r"^\| \((\S+), (\d)\) \| ↦ \| \((\S+), (\d)\) \| r(\S) \|$", page, re.M)

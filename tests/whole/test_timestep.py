@@ -17,17 +17,8 @@ LIMITS = ("tracking_error_max_mm", "handoff_gap_max_mm", "weld_residual_max_mm")
 """The figures that a timestep is chosen by."""
 
 
-# --- what is chosen -------------------------------------------------------------------------------
-
-
 def test_it_is_half_of_what_a_good_factory_keeps() -> None:
     assert {QUANTITIES[key].limit for key in LIMITS} == {2e3 * ALLOWED}
-
-
-# --- what was predicted is so ---------------------------------------------------------------------
-
-
-# --- from outside ---------------------------------------------------------------------------------
 
 
 def test_what_is_no_timestep_is_told(

@@ -51,9 +51,6 @@ def failed(run: Terminal, *more: object) -> set[str]:
     return {failure["code"] for failure in verdict["failures"]}
 
 
-# --- honest runs ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", EXAMPLES)
 @pytest.mark.parametrize(
     ("seed", "fuse"), [*(pytest.param(n, False, marks=pytest.mark.slow) for n in (0, 1)), (1, True)]
@@ -65,9 +62,6 @@ def test_an_honest_run_of_an_example_succeeds(name: str, seed: int, fuse: bool) 
     assert run.succeeded, run.verdict.failures
     assert run.monitor is not None
     assert len(run.monitor.seen) + len(run.monitor.inferred) == len(run.events)
-
-
-# --- planted faults -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("robot", "by"), [("r3", 0.0015)])
@@ -119,9 +113,6 @@ def test_a_run_whose_engine_has_warned(run: Terminal) -> None:
         done = run("run", PAPER, "--json")
     assert done.status == 1 and done.json["engine_warnings"] > 0
     assert [f["code"] for f in done.json["verdict"]["failures"]] == ["EngineWarning"]
-
-
-# --- logs -----------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,6 @@ import pytest
 from tests.good_runs import random_marking
 from tests.simulation_values import layout_of, ready
 
-# --- gaps -----------------------------------------------------------------------------------------
-
-
-# --- hands ----------------------------------------------------------------------------------------
-
 
 @pytest.mark.parametrize("seed", [1])
 def test_a_run_from_a_marking_begins_with_what_robots_hold(seed: int) -> None:

@@ -22,9 +22,6 @@ def run_in(world: Name, units: int = 2, **given: Any) -> Simulation:
     return Simulation(layout_of("paper"), RunRequest(world, units, settings=FINE, **given))
 
 
-# --- hooks ----------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", WORLDS)
 def test_a_hook_may_remove_itself(name: Name) -> None:
     """And the others act all the same, in that step too."""
@@ -40,9 +37,6 @@ def test_a_hook_may_remove_itself(name: Name) -> None:
         simulation.supervisor.step()
     assert calls[:2] == ["once", "other"] and calls.count("once") == 1
     assert calls.count("other") == (15 if name == "mujoco" else 3)
-
-
-# --- interventions --------------------------------------------------------------------------------
 
 
 def test_interventions_are_into_bodies() -> None:

@@ -51,9 +51,6 @@ def laid(project: Project) -> Layout:
     return project.layout
 
 
-# --- the table of joints --------------------------------------------------------------------------
-
-
 def test_the_program_tells_each_leg_and_that_it_is_not_certified(small: Project) -> None:
     text, _ = export(exporter("arm-program"), small.file, small)
     assert isinstance(text, str) and "is not\n# certified" in text
@@ -75,9 +72,6 @@ def test_a_folder_gets_a_file_for_every_arm(small: Project, tmp_path: Path) -> N
         assert [*files] == [tmp_path / name]
     with pytest.raises(FactoryError, match="--of 'r1' is none of the arms"):
         export(exporter("joints", "r1"), small.file, small, of="r1")
-
-
-# --- the model ------------------------------------------------------------------------------------
 
 
 def test_the_written_model_stands_still_in_its_keyframe(small: Project) -> None:
@@ -124,9 +118,6 @@ def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.Mon
     assert told.hint == "leave out --arm: rails make it"
 
 
-# --- the page of a running cell ------------------------------------------------------------------
-
-
 def test_a_page_shows_where_an_arm_places(small: Project) -> None:
     """Both parts are placed where the carrier stands in a run."""
     made = Simulation(laid(small), RunRequest(units=1))
@@ -136,8 +127,6 @@ def test_a_page_shows_where_an_arm_places(small: Project) -> None:
         made.supervisor.step()
     assert made.physical.d.site("r1/nest").xpos[:2] == pytest.approx(place, abs=1e-3)
 
-
-# --- what does not go with a cell -----------------------------------------------------------------
 
 REFUSED = [(("view",), ("--spares", "1", "--port", "0"), "--spares")]
 

@@ -98,9 +98,6 @@ def test_values_that_make_no_sense(make) -> None:
         make()
 
 
-# --- the catalogue, and files -------------------------------------------------------------------
-
-
 def test_an_error_stands_at_its_key_in_its_own_table(tmp_path: Path) -> None:
     """Not at the first key of that name, nor at one in another place."""
     path = tmp_path / "faults.toml"
@@ -158,9 +155,6 @@ def test_a_blackout_hides_what_noise_measures() -> None:
     assert np.isnan(made.world.sense()[0]).all()
 
 
-# --- the campaign: planted failures are seen ------------------------------------------------------
-
-
 def test_the_search_finds_the_last_point_that_holds() -> None:
     grid = disturbances.geometric(1, 64)
     for last in range(-1, len(grid)):
@@ -179,9 +173,6 @@ def test_the_quick_campaign_of_disturbances() -> None:
     results = disturbances.measure(quick=True)
     assert all(r["survived"] for r in results["products"][PAPER]["required"])
     assert "**all are.**" in disturbances.section(results)
-
-
-# --- domains of attraction ------------------------------------------------------------------------
 
 
 def test_a_law_that_does_not_come_to_its_goal_is_a_defect(monkeypatch) -> None:

@@ -65,9 +65,6 @@ def test_the_checker_knows_nothing_of_layouts() -> None:
         assert not [name for name in ours if not name.startswith(allowed)], module.name
 
 
-# --- forgeries ------------------------------------------------------------------------------------
-
-
 @dataclass
 class Forgery:
     """The documents of an example, to be changed."""
@@ -272,9 +269,6 @@ def test_the_command_says_whether_it_holds(forgery: Forgery, run: Terminal) -> N
     assert done.status == 1 and not done.json["holds"] and "r4/carriage" in done.json["faults"][0]
     done = run("check", "x.pag", "--clearance", forgery.folder)
     assert done.status == 2 and "Usage" in done.err
-
-
-# --- broken files ---------------------------------------------------------------------------------
 
 
 def halved(forgery: Forgery, end: str) -> None:

@@ -38,9 +38,6 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return kept_log(project(PAPER).layout, path, world="ideal", units=2)
 
 
-# the catalogue
-
-
 def test_help_says_what_each_is(run: Terminal) -> None:
     text = " ".join(run("export", "--help").out.split())
     for exporter in exporters().values():
@@ -65,12 +62,6 @@ def test_the_order_of_hashing_does_not_show() -> None:
     )
     here = [made(e.format) for e in exporters().values() if e.takes not in ("log", "cell")]
     assert done.stdout.split() == [hashlib.sha256(str(m).encode()).hexdigest() for m in here]
-
-
-# process mining
-
-
-# the command
 
 
 @pytest.mark.parametrize("form", [e.format for e in exporters().values() if e.binary])
@@ -139,9 +130,6 @@ def test_nets_from_elsewhere(run: Terminal, out: Path) -> None:
     assert run("export", out / "net.pnml", "--format", "st", "--json").codes == ["Usage"]
 
 
-# nets
-
-
 def test_without_gears_no_bar_lies_on_another_and_no_arc_goes_through_one() -> None:
     """The philosophers' left forks seemed to be taken by one transition."""
     for seed in range(12):
@@ -202,9 +190,6 @@ def test_a_choice_can_be_read_off_a_drawing() -> None:
         assert not any(abs(a - x) < half and abs(b - y) < 0.4 * size for a, b in arcs), text.text
 
 
-# programs
-
-
 def test_gates_are_kept() -> None:
     """What must wait for another axis stays short of its goal until that one stands."""
     chosen, text = project(LAMP), made("st", LAMP)
@@ -221,9 +206,6 @@ def test_gates_are_kept() -> None:
                     text,
                 )
     assert gates
-
-
-# the floor and the product
 
 
 @pytest.mark.parametrize("ending", ["gltf"])

@@ -18,27 +18,6 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return kept_log(project(LAMP).layout, tmp_path_factory.mktemp("log") / "lamp.log", units=2)
 
 
-# nets
-
-
-# the floor
-
-
-# programs
-
-
-# products
-
-
-# the factory
-
-
-# robots
-
-
-# runs
-
-
 @pytest.mark.parametrize("which", READERS)
 def test_read_back(which: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     reader = READERS[which]

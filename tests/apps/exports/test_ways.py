@@ -79,15 +79,6 @@ def test_a_wait_that_is_taken_out_is_refused() -> None:
     refused(check(m, machines, clearance), "r1 and r8", "not of the net", ORDER)
 
 
-# --- presences ------------------------------------------------------------------------------------
-
-
-# --- the certificate ------------------------------------------------------------------------------
-
-
-# --- order places in a run ------------------------------------------------------------------------
-
-
 def test_an_operation_waits_for_another() -> None:
     fired = [0] * 6
     ordering = Ordering([Order(3, 4, 0)])

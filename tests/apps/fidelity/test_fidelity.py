@@ -9,14 +9,6 @@ from factory.apps.fidelity import QUANTITIES
 from tests.command_line import Terminal
 from tests.paths import PAPER
 
-# --- planted in the engine -------------------------------------------------------------------
-
-
-# --- many seeds ------------------------------------------------------------------------------
-
-
-# --- the command -----------------------------------------------------------------------------
-
 
 def test_the_command_prints_figures(run: Terminal, out: Path) -> None:
     words = (PAPER, "--seeds", 1, "--jobs", 1)

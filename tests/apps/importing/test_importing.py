@@ -74,9 +74,6 @@ def shape_of(pag: PAG) -> dict[str, tuple[str, ...]]:
     return {node.label: node.inputs for node in pag.nodes if node.inputs}
 
 
-# --- LDraw ----------------------------------------------------------------------------------------
-
-
 def test_the_cart_of_the_examples(
     templates: Mapping[str, Template], golden: Callable[[str, str], None]
 ) -> None:
@@ -162,9 +159,6 @@ def test_an_unknown_colour_is_a_warning(bring: Importer) -> None:
     ]
 
 
-# --- trees ----------------------------------------------------------------------------------------
-
-
 def plain(pag: PAG) -> dict[str, tuple[Any, ...]]:
     """The content of a PAG, in which the order of statements and parameters does not count."""
     return {
@@ -233,8 +227,6 @@ def test_bytes_that_are_no_text_are_told_by_their_place(
 ) -> None:
     assert bring.faults(name, text) == [found]
 
-
-# --- bills of materials ---------------------------------------------------------------------------
 
 BILL = """level,part number,Qty,mesh,x [mm],y [mm],z [mm],supplier
 0,table,,,,,,us
@@ -314,9 +306,6 @@ def test_an_unknown_unit_is_named(bring: Importer, run: Terminal) -> None:
     assert "units are kg, g, mg, t, lb, oz" in str(done.json["errors"])
 
 
-# --- the manual -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "pattern", "operations", "parts"),
     [("table.csv", r"\n\n((?: {4}[^\n]*,[^\n]*\n)+)", {"table", "frame"}, 5)],
@@ -338,9 +327,6 @@ def test_the_examples_of_the_manual(
     )
 
 
-# --- how deep, how large --------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -356,9 +342,6 @@ def test_what_multiplies_without_end_is_refused(bring: Importer, name: str, text
         head = f"1 4 0 0 0 {PLAIN} 0.dat\n"
     last = f"0 FILE 60{text[10:14]}\n1 4 0 0 0 {PLAIN} tile.dat\n{TILE}" if name == "m.mpd" else ""
     assert [fault.split()[1] for fault in bring.faults(name, head + lines + last)] == ["TooLarge"]
-
-
-# --- what is written ------------------------------------------------------------------------------
 
 
 def test_nothing_is_written_where_something_is_wrong(

@@ -70,9 +70,6 @@ SEAMED: dict[str, Callable[[trimesh.Trimesh], bytes | str]] = {
 }
 
 
-# --- closed -----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", SEAMED)
 def test_bodies_that_touch_are_kept_apart_behind_seams(tmp_path: Path, name: str) -> None:
     """An L of two boxes that share a corner each: in one OBJ, and as two meshes of a GLB."""
@@ -92,9 +89,6 @@ def test_bodies_that_touch_are_kept_apart_behind_seams(tmp_path: Path, name: str
     assert found.warnings == ()
     assert [len(piece) for piece in found.solids["p"].pieces] == [8, 8]
     assert found.mass == pytest.approx(3.0, rel=1e-5)
-
-
-# --- mended -----------------------------------------------------------------------------------
 
 
 def to_and_fro() -> trimesh.Trimesh:
@@ -234,8 +228,6 @@ def test_a_cavity_stays_one(tmp_path: Path) -> None:
     found = product(tmp_path, "m.stl", both.export(file_type="stl"))
     assert found.mass == pytest.approx(8000 * (volume + EDGE**3), rel=1e-5)
 
-
-# --- broken -----------------------------------------------------------------------------------
 
 FAULTS = (
     ("m.obj", "", "it is empty"),

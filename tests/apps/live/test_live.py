@@ -32,9 +32,6 @@ websockets = pytest.importorskip("websockets.sync.client", reason="pip install w
 PARTS = ("part1", "part2", "part3")
 
 
-# --- commands ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("message", "command"),
     [('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1))],
@@ -56,12 +53,6 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
     with pytest.raises(ValueError) as error:
         command_of(message, 6, PARTS)
     assert words in str(error.value)
-
-
-# --- interventions ------------------------------------------------------------------------------
-
-
-# --- a session ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -114,9 +105,6 @@ def test_it_says_when_the_engine_gives_up(running: Running) -> None:
     assert "unstable" in note and "restart it" in note
     running.session.send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
-
-
-# --- a server ----------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -235,9 +223,6 @@ def test_a_push_answers() -> None:
 
 
 ANSWER = r"r3 was pushed back with \d+ N and displaced by [1-9]\d*\.\d mm"
-
-
-# --- the command -------------------------------------------------------------------------------
 
 
 def test_the_command_serves_until_it_is_interrupted() -> None:

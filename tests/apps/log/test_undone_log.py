@@ -112,9 +112,6 @@ def test_damaged_lists(kept: Path, tmp_path: Path, content: object) -> None:
         read_log(rewritten(kept / "run.log", tmp_path / "bad", lambda _: content))
 
 
-# What failed, as it happens
-
-
 def test_logs_of_runs_without_faults_have_nothing_of_them(tmp_path: Path) -> None:
     for faulty in (False, True):
         more = ("--spares", 1) if faulty else ()

@@ -56,9 +56,6 @@ def paper() -> Layout:
     return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
 
 
-# --- good runs ------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("seed", [1, 2, 4])
 def test_the_papers_example_is_explained(paper: Layout, seed: int) -> None:
     simulation = Simulation(
@@ -85,9 +82,6 @@ def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
                 imported.add(node.module or "")
     rooms = {".".join(name.split(".")[1:3]) for name in imported if name.startswith("factory.")}
     assert not rooms & {"engine.simulation", "theory.control", "floor.modes"}
-
-
-# --- planted faults -------------------------------------------------------------------------------
 
 
 def assert_caught(
@@ -234,9 +228,6 @@ def test_firings_in_an_impossible_order(paper: Layout) -> None:
     _, _, found = explanation.solve(0.0, 9.0)
     assert [v.label for v in found] == ["sub2", "sub3"]
     assert "part3_e must come first, and was not observed" in found[1].message
-
-
-# --- logs and the command line --------------------------------------------------------------------
 
 
 def test_logs_that_cannot_be_watched(paper: Layout, tmp_path: Path, run: Terminal) -> None:

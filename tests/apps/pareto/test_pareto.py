@@ -65,9 +65,6 @@ def test_a_run_is_as_long_as_is_predicted(front: ParetoFront) -> None:
     assert trial.ideal is not None
 
 
-# --- files ----------------------------------------------------------------------------------------
-
-
 def read_back(file: Path) -> Project:
     """A project as the command line reads it."""
     from factory.commands.requests import ProjectOptions
@@ -146,9 +143,6 @@ def test_axes_have_enough_marks(front: ParetoFront) -> None:
     assert "<title>as written" in cycle_chart(front)
 
 
-# --- the command ----------------------------------------------------------------------------------
-
-
 def test_a_failed_run_is_told(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Trial(4, 1.0, 1.0, 1.0, ("mujoco: Contact: r1 meets r2",))
     monkeypatch.setattr("factory.apps.pareto.front.tried", lambda _: failed)
@@ -200,9 +194,6 @@ def test_a_search_that_is_stopped_at_once_writes_nothing(
     assert done.codes == ["Interrupted"]
     assert "points" not in done.json
     assert not (out / "front").exists()
-
-
-# --- progress -------------------------------------------------------------------------------------
 
 
 def test_a_search_shows_how_far_it_is(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -132,12 +132,6 @@ def test_a_sub_tree_is_kept_and_the_rest_replanned(tmp_path: Path) -> None:
     assert pag[pag.root].inputs == tuple(units)
 
 
-# Parts alike
-
-
-# Broken input, through the command line
-
-
 def refused(run: Terminal, source: Path, *words: object) -> dict[str, Any]:
     """The one error with which a source is refused; nothing is written."""
     out = source.parent / "out"
@@ -231,9 +225,6 @@ def test_a_tree_is_not_thrown_away_unasked(run: Terminal, tmp_path: Path) -> Non
     assert "did you mean 'left'" in done.json["errors"][0]["hint"]
     done = run("plan", chair, "--keep", "chair", "-o", tmp_path / "out", "--json")
     assert (done.status, done.codes) == (2, ["Usage"])
-
-
-# What is written
 
 
 def test_names_from_files_stay_in_the_folder(tmp_path: Path) -> None:

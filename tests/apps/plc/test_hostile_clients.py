@@ -90,9 +90,6 @@ def test_a_subscription_whose_filter_fails_is_dropped() -> None:
     served(talk)
 
 
-# what is driven
-
-
 def driven(
     controller: Any, name: str = "paper", busy: float = float("inf"), most: float = 6.0
 ) -> tuple[Simulation, DrivenSupervisor]:

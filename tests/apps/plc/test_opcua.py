@@ -69,9 +69,6 @@ def test_what_may_not_be_is_refused_by_name() -> None:
     assert products == 0
 
 
-# the command
-
-
 PAGE = (ROOT / "docs" / "guide" / "plc.md").read_text("utf-8")
 
 

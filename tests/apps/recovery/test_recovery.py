@@ -70,8 +70,6 @@ def assert_recovered(run: Run, failures: Failures, struck: dict[str, int]) -> No
     assert run.refines_net and run.succeeded
 
 
-# --- each kind ------------------------------------------------------------------------------------
-
 EACH: dict[str, tuple[Deviation, str, str]] = {
     "drop": (Deviation("drop", label="sub2", unit=2), "lost", "scrap"),
     "askew": (Deviation("misplaced", label="part2", unit=1, metres=4e-3), "misplaced", "scrap"),
@@ -106,9 +104,6 @@ def test_each_kind_of_fault(name: str, world: str) -> None:
         assert run.sim_time_s > run_with(world=world, jitter=0.3)[0].sim_time_s + 0.5
 
 
-# --- other factories ------------------------------------------------------------------------------
-
-
 def test_what_comes_after_a_part_that_lies_askew_hangs_straight() -> None:
     """However many lie askew at once: the next ones touch no housing."""
     layout = with_hands("truck")
@@ -137,9 +132,6 @@ def test_a_fault_that_no_sensor_finds_is_named_first(monkeypatch: pytest.MonkeyP
     first, *others = run.verdict.failures
     assert first.code == "Unseen" and "misplaced 'part1' of unit 1" in first.message
     assert others and not run.succeeded
-
-
-# --- what is not found, and what cannot be helped -------------------------------------------------
 
 
 def with_failures(name: str, *failures: Failure) -> Layout:
@@ -187,9 +179,6 @@ def test_robots_with_programs_of_their_own_do_not_recover() -> None:
         recover(simulation)
 
 
-# --- planted faults -------------------------------------------------------------------------------
-
-
 BLIND: dict[str, tuple[type, str, Any, str]] = {
     "drop": (MujocoPlant, "lost", lambda plant: (), "jammed"),
     "bad_joint": (MujocoPlant, "residual", lambda plant, operation: 0.0, ""),
@@ -210,8 +199,6 @@ def test_blind_sensors_never_succeed_unnoticed(name: str, monkeypatch: pytest.Mo
     stalled = run.trouble is not None and run.trouble.code == "Stalled"
     assert stalled if name == "dead" else failures.missed == 1
 
-
-# --- files of faults ------------------------------------------------------------------------------
 
 WRONG: dict[str, tuple[str, str, str]] = {
     "unknown key": ("sed = 1", "UnknownParameter", "unknown key 'sed'"),
@@ -311,6 +298,3 @@ def test_all_that_is_wrong_is_said_at_once_and_where(run: Terminal, tmp_path: Pa
     assert done.codes == ["UnknownParameter", "BadFault"]
     assert [error["line"] for error in done.json["errors"]] == [1, 3]
     assert "drop" in done.json["errors"][1]["hint"]
-
-
-# --- the command line -----------------------------------------------------------------------------

@@ -35,9 +35,6 @@ def some_asked(fired: Counts, rng: random.Random) -> tuple[int, ...]:
     return tuple(e for e in chosen for _ in range(rng.randint(1, min(2, fired[e]))))
 
 
-# --- the greatest, by brute force ----------------------------------------------------------------
-
-
 def brute(net: MarkedNet, fired: Counts, asked: tuple[int, ...], made: Joins) -> Counts:
     """The greatest of all counts that are allowed; it is one of them."""
     tops = [count - asked.count(event) for event, count in enumerate(fired)]
@@ -93,9 +90,6 @@ def test_what_cannot_be_undone() -> None:
         undo(factory.net, nothing, (factory.by_label["part2"].start,), factory.joins)
     with pytest.raises(ValueError, match="no transition is asked"):
         undo(factory.net, nothing, (), factory.joins)
-
-
-# --- Theorem 5, at every marking -----------------------------------------------------------------
 
 
 def failures(factory: Factory, fired: Sequence[int]) -> Iterator[tuple[int, ...]]:

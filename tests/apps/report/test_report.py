@@ -198,9 +198,6 @@ def test_a_fused_body_of_which_each_part_is_apart_is_drawn(run: Terminal, tmp_pa
     assert run("report", log, "-o", tmp_path / "apart.html").status == 0
 
 
-# how it looks
-
-
 def test_corners_have_the_finish_of_their_material(made: Page, recording) -> None:
     m = recording.stage.drawn
     known = {

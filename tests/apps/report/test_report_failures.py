@@ -66,9 +66,6 @@ def test_what_is_no_account_of_failures_is_refused(
         failures_of(told, frozenset(recording.log.header["robots"]))
 
 
-# --- the table of events ------------------------------------------------------------------------
-
-
 def test_csv_says_so(recording: Recording) -> None:
     text = exporters()["csv"].export(Subject(Path("log"), recording.log))
     assert isinstance(text, str)

@@ -98,9 +98,6 @@ def test_a_run_that_goes_on_is_the_same_to_the_last_bit(name: str, tmp_path: Pat
     assert log.read_bytes() == whole.read_bytes()
 
 
-# --- the command line
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The log of a run that was not cut off; not to be written."""
@@ -159,9 +156,6 @@ def test_what_cannot_be_gone_on_with(
         assert done.status == 2 and "Usage" in done.err and str(words[0]) in done.err
 
 
-# --- planted faults
-
-
 Change = Callable[[dict[str, Any], Arrays], None]
 """Changes a header, or a block of ticks."""
 
@@ -211,9 +205,6 @@ def test_what_does_not_come_again_is_refused(
     done = run("run", "--resume", log, "--json")
     assert done.status == 2 and done.codes == ["BadLog"] and words in done.err + done.out, done
     assert log.read_bytes() == before
-
-
-# --- kills
 
 
 def killed_and_gone_on(

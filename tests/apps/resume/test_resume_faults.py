@@ -39,9 +39,6 @@ unit = 3
 """
 
 
-# --- the command line
-
-
 @pytest.fixture(scope="module")
 def words(tmp_path_factory: pytest.TempPathFactory) -> tuple[object, ...]:
     """The words of a run with faults in the ideal world."""

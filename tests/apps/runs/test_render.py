@@ -76,9 +76,6 @@ def film_of(path: Path) -> np.ndarray:
     return iio.imread(path, plugin="pyav")
 
 
-# --- films ------------------------------------------------------------------------------------
-
-
 @needs_gl
 def test_then_it_shows_the_product_alone_and_from_more_than_one_side(taken) -> None:
     before, one, *_, other = taken[3][-TURNED - 1 :]
@@ -160,9 +157,6 @@ def test_films_need_no_encoder_under_the_gpl(
         VideoFile(tmp_path / "none.mp4", (64, 48), 25)
 
 
-# --- what is to be seen -----------------------------------------------------------------------
-
-
 def missing_parts(layout, picture: np.ndarray) -> list[str]:
     """The parts whose hue has next to no pixel in the middle of the picture."""
     tall, wide = picture.shape[0] // 5, picture.shape[1] // 4
@@ -208,9 +202,6 @@ def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(loo
     assert upright.distance < 1.5 * turned.distance
 
 
-# --- meshes -----------------------------------------------------------------------------------
-
-
 def test_an_open_mesh_is_seen_from_both_sides() -> None:
     corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
     sheet = Mesh("m", corners, np.array([(0, 1, 2), (0, 1, 3)]))
@@ -218,9 +209,6 @@ def test_an_open_mesh_is_seen_from_both_sides() -> None:
     assert name == "m.obj" and content.count(b"\nf ") == 4
     whole = Mesh("m", corners, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]))
     assert mesh_file(whole)[0] == "m.stl"
-
-
-# --- what is refused --------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -241,9 +229,6 @@ def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="ideal world"):
         render_log(read_log(tmp_path / "log"), Shot(tmp_path / "a.mp4"))
     assert not (tmp_path / "a.mp4").exists()
-
-
-# --- where GL is missing ----------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -44,9 +44,6 @@ def reddish(pixels: np.ndarray, colour: tuple[int, int, int], reach: int = 40) -
     return (np.abs(pixels.astype(int) - colour) < reach).all(axis=-1)
 
 
-# Robots go back.
-
-
 @pytest.fixture(scope="module")
 def subject():
     return MonitorSubject.of(paper_layout(), Settings())
@@ -60,9 +57,6 @@ def test_what_was_undone_is_marked_from_then_on(log: Log) -> None:
     assert spells and all(spell.end <= spell.undone + 1e-6 for spell in spells)
     before, after = history.counts(lost.t - 1e-6), history.counts(lost.t)
     assert sum(before.values()) - sum(after.values()) == len(lost.transitions)
-
-
-# What is drawn.
 
 
 def test_a_run_without_failures_has_none_of_it(subject) -> None:
@@ -99,9 +93,6 @@ def test_a_failure_in_words(failing: Failing, words: str) -> None:
     assert str(failing) == words
 
 
-# What a log keeps.
-
-
 def test_a_log_keeps_what_went_wrong(log: Log, tmp_path: Path) -> None:
     failures = log.failures
     assert failures is not None
@@ -109,9 +100,6 @@ def test_a_log_keeps_what_went_wrong(log: Log, tmp_path: Path) -> None:
     dead = next(one for one in failures.found if one.test == "jammed")
     assert dead.until == pytest.approx(dead.t + 3.0)
     assert failures.spares == 1 and failures.stood
-
-
-# Marks on the floor.
 
 
 def marks_at(log: Log, time: float, history: History | None = None) -> list[Mark]:
@@ -128,9 +116,6 @@ def test_what_lies_about_has_a_zone_round_it(log: Log) -> None:
     assert len(zones) == 1 and zones[0].radius > 0.02
     cleared = drop.t + 3.0  # it lies for 2 s
     assert FLASH not in [mark.colour for mark in marks_at(log, cleared)]
-
-
-# Robots that are replaced.
 
 
 def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None:

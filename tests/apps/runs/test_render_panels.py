@@ -72,9 +72,6 @@ def net_panel(history: History, size=SIZE) -> NetPanel:
     return NetPanel(size, 1.0, history, Rows(history))
 
 
-# What is shown is what happened.
-
-
 def test_tokens_glide_and_never_go_back(paper: Log) -> None:
     panel = net_panel(told(paper))
     steps = []
@@ -84,9 +81,6 @@ def test_tokens_glide_and_never_go_back(paper: Log) -> None:
         steps += [panel.tokens[r] - at for r, at in before.items()]
     assert max(steps) < 1.2 and min(steps) > -0.02
     assert sum(step > 0.5 for step in steps) < 0.1 * len(steps)
-
-
-# Many robots.
 
 
 @pytest.fixture(scope="module", params=["balanced", "truck"])
@@ -144,9 +138,6 @@ def test_what_a_robot_does_is_said_beside_its_ring(paper: Log) -> None:
     assert max(changed[:, side].mean() for side in beside) > 0.05
 
 
-# Which product cameras follow.
-
-
 @pytest.mark.parametrize("fuse", [True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
@@ -165,9 +156,6 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     assert len(back) == 1 and ranks[back[0] - 1] == 3.0  # r1 carries three: it drops off
     assert set(labels) == ({"part1", "sub1", "sub3"} if fuse else {"part1"})
     assert ranks[0] == 0.0
-
-
-# Cameras, areas, words.
 
 
 BOX = read_pag("root = all; all = mate(lid, box); lid = atomic(); box = atomic()", TEMPLATES)
@@ -218,9 +206,6 @@ def test_a_title_fades_and_then_leaves_the_picture_alone() -> None:
     assert not changed[:, -20:].any() and not changed[180:].any()
 
 
-# Posters.
-
-
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
     scene = model_of(paper), recorded_subject(paper.header)
     take = recorded_take(paper, lambda: scene, Picture(SIZE))
@@ -234,12 +219,6 @@ def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper
     assert isinstance(poster.moment, Moment)
     assert min(abs(poster.moment.time - t) for t in ends) < 0.02 and len(ends) == 3
     assert poster.moment.time > ends[0] + 0.1  # by then more has come in
-
-
-# Films.
-
-
-# The command line.
 
 
 @needs_gl

@@ -79,9 +79,6 @@ def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
     return np.concatenate(found)
 
 
-# --- framing --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("camera", ["overview", "orbit", "top"])
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS, Framing(9 / 16, below=0.1)])
 def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera, framing) -> None:
@@ -112,9 +109,6 @@ def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, came
     assert eighths.shape == (8, 8, 3) and np.abs(seen(view, eighths.reshape(-1, 3))).max() < 1
     sizes = np.ptp(eighths, axis=1)
     assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
-
-
-# --- hand-overs -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
@@ -201,9 +195,6 @@ def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
     assert (m.geom_rgba == before).all() and (m.geom_group == groups).all()
 
 
-# --- a tour ---------------------------------------------------------------------------------------
-
-
 def carriage_at(log: Log, take: Take, robot: str, time: float) -> Array:
     """Where a robot's carriage is at a time of a log (3,) [m]."""
     d = mujoco.MjData(take.m)
@@ -248,9 +239,6 @@ def test_a_tour_cuts_at_events(log, take) -> None:
     assert all(time - back >= BETWEEN for time in others)
     whole = [t for t, label in ends if label in factory.products][-1]
     assert output == {factory.robots[0].name} and whole < end <= whole + STAYS + 1 / 30
-
-
-# --- fading ---------------------------------------------------------------------------------------
 
 
 def test_fading_is_of_the_view_alone(take, action) -> None:

@@ -47,12 +47,6 @@ def has_rows(path: Path, least: int) -> bool:
         return False
 
 
-# The grid
-
-
-# Rows
-
-
 def test_a_run_that_fails_is_a_row_with_its_reason(
     run: Terminal, tmp_path: Path, here: None
 ) -> None:
@@ -174,9 +168,6 @@ def test_bad_command_lines_write_nothing(
     assert not files_in(tmp_path)
 
 
-# Processes that die
-
-
 def test_a_killed_worker_loses_the_run_under_way_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,9 +180,6 @@ def test_a_killed_worker_loses_the_run_under_way_alone(
     assert found[1].reason == "Killed the process died in 2 tries (exit status -9)"
     assert found[2].reason == "" and found[2].tries == 2
     assert all(found[n].reason == "" and found[n].tries == 1 for n in (0, 3, 4, 5, 6, 7))
-
-
-# The summary
 
 
 def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
@@ -212,6 +200,3 @@ def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
 def test_columns_are_named_once() -> None:
     assert set(FIGURES) < set(COLUMNS)
     assert {"seed", "jitter", "world", "clearance", "reason", "row_time_s"} < set(COLUMNS)
-
-
-# What fails
