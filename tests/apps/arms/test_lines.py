@@ -82,7 +82,6 @@ def test_a_heavy_part_is_held_by_a_pin() -> None:
 
 @pytest.mark.slow
 def test_eight_sub_assemblies_have_no_room() -> None:
-    """`test_feeders_without_room_are_refused` has parts in their place."""
     parts, joins = [], []
     for n in range(8):
         x = 0.06 * n
