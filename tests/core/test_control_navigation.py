@@ -45,14 +45,6 @@ def insert(lengths: Array, standoff: float = 0.3, eps: float = EPS) -> Mode:
     )
 
 
-def weld(lengths: Array) -> Mode:
-    """A tool whose guidepath ends at the station of the carrier; both stop 2r short of it."""
-    station = 0.4 * lengths[0]
-    goals = np.array([station + 2 * R, 2 * R])
-    meet = np.array([[station, 0.0]])
-    return Mode(goals, np.zeros(2), lengths, EPS, np.array([[0, 1]]), meet, np.array([R]))
-
-
 def chain(lengths: Array) -> Mode:
     """Three robots, each waiting for the one before."""
     gate, standoff = np.array([-1, 0, 1]), np.array([0.0, 0.2, 0.3])
@@ -64,16 +56,7 @@ def atomic(lengths: Array) -> Mode:
     return Mode(lengths, np.zeros(1), lengths, EPS)
 
 
-CASES: dict[str, tuple[Callable[[Array], Mode], int]] = {
-    "atomic": (atomic, 1),
-    "mate": (mate, 3),
-    "mate at B": (lambda lengths: mate(lengths, ahead=0.0), 3),
-    "mate of four": (mate, 5),
-    "mate of five": (mate, 6),
-    "insert": (insert, 2),
-    "weld": (weld, 2),
-    "chain": (chain, 3),
-}
+CASES: dict[str, tuple[Callable[[Array], Mode], int]] = {"chain": (chain, 3)}
 
 
 def bundle_of(modes: list[Mode], v: float = 1.0, a: float = 4.0) -> Bundle:

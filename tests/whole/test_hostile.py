@@ -13,7 +13,7 @@ from factory.apps.foreign_nets import pnml_reader
 from factory.apps.log.content import RECORD
 from factory.support import files, xml_tree
 from factory.support.errors import SHOWN, InputError
-from factory.support.files import MESH, MIB, NET, TABLE, TEXT, read_bytes
+from factory.support.files import MESH, MIB, TABLE, TEXT, read_bytes
 from factory.theory.lang import load_templates, read_pag
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
@@ -30,15 +30,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 READERS = [
-    (["check", "F"], "", TEXT),
-    (["check", "F.pnml"], "", NET),
     (["check", PAPER, "--templates", "own"], "own/x.op", TEXT),
     (["check", "p.pag"], "factory.toml", TABLE),
     (["check", "p.pag"], "p.obj", MESH),
-    (["import", "F.json", "-o", "out"], "", TEXT),
-    (["import", "F.yaml", "-o", "out"], "", TEXT),
-    (["import", "F.csv", "-o", "out"], "", TEXT),
-    (["import", "F.ldr", "-o", "out"], "", TEXT),
     (["import", "t.json", "-o", "out"], "p.obj", MESH),
     (["import", "m.ldr", "--library", "own", "-o", "out"], "own/LDConfig.ldr", TEXT),
     (["monitor", "F"], "", RECORD),

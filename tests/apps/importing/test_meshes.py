@@ -230,24 +230,15 @@ def test_a_cavity_stays_one(tmp_path: Path) -> None:
 
 
 FAULTS = (
-    ("m.obj", "", "it is empty"),
     ("m.obj", "# nothing\n", f"it is not {EXPECTED['.obj']}"),
-    ("m.obj", "v 0 0 0\n", f"it has no triangles; it should be {EXPECTED['.obj']}"),
-    ("m.obj", "v 1 2\nf 1 1 1\n", "line 1 has no vertex: 'v x y z' takes three numbers"),
-    ("m.obj", "v 0 0 1\n\nv 0 nan 0\nf 1 1 2\n", "line 3 has a vertex that is not finite: 0 nan 0"),
-    ("m.obj", "v 0 0 -inf\nf 1 1 1\n", "line 1 has a vertex that is not finite: 0 0 -inf"),
     (
         "m.obj",
         "v 0 0 1\nf 1 1\n",
         "line 2 has no face: 'f 1 2 3' takes three vertices or more, by number",
     ),
     ("m.obj", "v 0 0 1\nf 1 1 0\n", "line 2 has a face with a vertex that does not exist: 0"),
-    ("m.obj", "v 0 0 1\nf 1 1 -2\n", "line 2 has a face with a vertex that does not exist: -2"),
     ("m.obj", "v 0 0 1\nf 1 1 7\n", "a face has the vertex 7, but there are 1"),
-    ("m.stl", "no mesh", f"it has no triangles; it should be {EXPECTED['.stl']}"),
     ("m.stl", b"\xff" * 90, f"it is not {EXPECTED['.stl']}"),
-    ("m.ply", "ply\n", f"it is not {EXPECTED['.ply']}"),
-    ("m.glb", b"glTF\2\0\0\0", f"it is not {EXPECTED['.glb']}"),
 )
 
 

@@ -229,15 +229,9 @@ def planted(after: str, what: str) -> Callable[[str], str]:
 
 
 STRANGE: Mapping[str, tuple[Callable[[str], str], str]] = {
-    "include": (planted("<worldbody>", '<include file="/etc/passwd"/>'), "it has <include>"),
-    "mesh": (planted("<asset>", '<mesh name="x" file="/tmp/x.stl"/>'), "is not in the log"),
     "above": (planted("<asset>", '<mesh name="x" file="../x.stl"/>'), "is not in the log"),
     "folder": (lambda xml: xml.replace('meshdir="meshes"', 'meshdir="/tmp"'), "'/tmp'"),
     "texture": (planted('type="skybox"', ' file="/tmp/x.png"'), "has 'file'"),
-    "large texture": (lambda xml: xml.replace('width="256"', 'width="65536"'), "width is '65536'"),
-    "hfield": (planted("<asset>", '<hfield name="h" nrow="60000" ncol="60000"/>'), "<hfield>"),
-    "replicate": (planted("<worldbody>", '<replicate count="99999999"/>'), "<replicate>"),
-    "plugin": (planted("<asset>", '<mesh name="x"><plugin plugin="x"/></mesh>'), "<plugin>"),
     "memory": (lambda xml: xml.replace('memory="64M"', 'memory="64G"'), "64G MiB"),
     "user": (planted('<geom name="floor"', f' user="{"1 " * 9}"'), "more than 8 numbers"),
     "samples": (lambda xml: xml.replace('nsample="', 'nsample="9999999'), "nsample is"),

@@ -1,5 +1,4 @@
-"""STEP files by three writers: OpenCASCADE 7.9 and SolveSpace 3.1 (`data/step`), and that of these
-tests. Colours by face, several solids a component, assemblies, inches: read as they were drawn."""
+"""STEP files by OpenCASCADE 7.9 (`data/step`) and by the writer of these tests: read as drawn."""
 
 from __future__ import annotations
 
@@ -31,19 +30,10 @@ FILES: Mapping[str, Mapping[str, Part]] = {
         "lower": ((0, 0, 0, 40, 40, 20), None, BLUE),
         "upper": ((0, 0, 20, 40, 40, 30), None, GREY),
     },
-    "six_colours": {
-        "die": ((5, 5, 5, 25, 25, 25), None, (0.0, 1.0, 0.5)),
-        "tray": ((0, 0, 0, 30, 30, 5), None, None),
-    },
     "touching_solids": {
         "pair-1": ((0, 0, 0, 30, 30, 10), None, BLUE),
         "pair-2": ((30, 0, 0, 60, 30, 10), None, BLUE),
         "hollow": ((0, 0, 10, 30, 30, 40), 30**3 - 20**3, GREY),
-    },
-    "three_solids_one_part": {
-        "triple-1": ((0, 0, 0, 20, 20, 10), None, GREEN),
-        "triple-2": ((4, 4, 10, 16, 16, 25), np.pi * 36 * 15, GREEN),
-        "triple-3": ((0, 0, 25, 20, 20, 30), None, GREEN),
     },
     "nested_assembly": {
         "plate": ((-30, -20, 0, 30, 20, 10), 24000 - 2 * np.pi * 250, BLUE),
@@ -55,49 +45,12 @@ FILES: Mapping[str, Mapping[str, Part]] = {
         "base": ((0, 0, 0, 101.6, 50.8, 12.7), None, BLUE),
         "top": ((0, 0, 12.7, 101.6, 50.8, 38.1), None, GREY),
     },
-    "metres": {
-        "base": ((0, 0, 0, 300, 200, 50), None, None),
-        "top": ((90, 40, 50, 210, 160, 130), np.pi * 3600 * 80, None),
-    },
-    "turned_instances": {
-        "ell-1": ((0, 0, 0, 40, 30, 10), 6000, GREEN),
-        "ell-2": ((-30, 0, 10, 0, 40, 20), 6000, GREEN),
-        "ell-3": ((-40, -30, 20, 0, 0, 30), 6000, GREEN),
-    },
 }
 """What OpenCASCADE was told to write."""
 
-
 LOWER, UPPER = ((0, 0, 0), (40, 40, 20)), ((0, 0, 20), (40, 40, 30))
 BESIDE: Box = ((40, 0, 0), (80, 40, 20))
-SIX = {n: (n / 6, 1 - n / 6, 0.5) for n in range(6)}
-FLAT = (0, 0, 0, 40, 40, 20), None, None
 OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
-    "faces": (
-        step_of(
-            {"lower": LOWER, "upper": UPPER},
-            colours={"lower": {-1: BLUE, 0: RED}, "upper": {2: RED}},
-        ),
-        {
-            "lower": ((0, 0, 0, 40, 40, 20), None, BLUE),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
-    "six": (
-        step_of({"lower": LOWER, "upper": UPPER}, colours={"lower": SIX}),
-        {
-            "lower": ((0, 0, 0, 40, 40, 20), None, SIX[4]),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
-    "solids": (
-        step_of({"pair": [LOWER, BESIDE], "upper": UPPER}),
-        {
-            "pair-1": FLAT,
-            "pair-2": ((40, 0, 0, 80, 40, 20), None, None),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
     "two colours": (
         step_of(
             {"pair": [LOWER, BESIDE], "upper": UPPER},
@@ -108,44 +61,7 @@ OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
             "pair-2": ((40, 0, 0, 80, 40, 20), None, RED),
             "upper": ((0, 0, 20, 40, 40, 30), None, None),
         },
-    ),
-    "inches": (
-        step_of({"lower": ((0, 0, 0), (4, 4, 2)), "upper": ((0, 0, 2), (4, 4, 3))}, inches=True),
-        {
-            "lower": ((0, 0, 0, 101.6, 101.6, 50.8), None, None),
-            "upper": ((0, 0, 50.8, 101.6, 101.6, 76.2), None, None),
-        },
-    ),
-    "assembly": (
-        step_of(
-            {"base": ((0, 0, 0), (60, 20, 5)), "brick": ((0, 0, 0), (20, 20, 10))},
-            places={"base": [(0, 0, 0)], "brick": [(0, 0, 5), (20, 0, 5), (40, 0, 5)]},
-        ),
-        {
-            "base": ((0, 0, 0, 60, 20, 5), None, None),
-            "brick-1": ((0, 0, 5, 20, 20, 15), None, None),
-            "brick-2": ((20, 0, 5, 40, 20, 15), None, None),
-            "brick-3": ((40, 0, 5, 60, 20, 15), None, None),
-        },
-    ),
-    "assembly in inches": (
-        step_of(
-            {
-                "base": ((0, 0, 0), (6, 2, 1)),
-                "brick": [((0, 0, 0), (2, 2, 1)), ((0, 0, 1), (2, 2, 2))],
-            },
-            inches=True,
-            places={"base": [(0, 0, 0)], "brick": [(0, 0, 1), (4, 0, 1)]},
-            colours={"brick": {-1: RED}},
-        ),
-        {
-            "base": ((0, 0, 0, 152.4, 50.8, 25.4), None, None),
-            "brick-1-1": ((0, 0, 25.4, 50.8, 50.8, 50.8), None, RED),
-            "brick-2-1": ((0, 0, 50.8, 50.8, 50.8, 76.2), None, None),
-            "brick-1-2": ((101.6, 0, 25.4, 152.4, 50.8, 50.8), None, RED),
-            "brick-2-2": ((101.6, 0, 50.8, 152.4, 50.8, 76.2), None, None),
-        },
-    ),
+    )
 }
 """What our writer is told to write."""
 
