@@ -7,10 +7,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benches import reporting
+from benches.compare import manuals
 from benches.compare.__main__ import REPORT as COMPARISON
+from benches.covering import chosen, listed
 from benches.faults.__main__ import REPORT as FAULTS
 from benches.reporting import Report
 from benches.speed import large, processes
@@ -86,3 +89,37 @@ def test_a_digest_of_the_physics_is_of_models_and_runs(
 def test_the_import_of_a_large_product_is_measured() -> None:
     (row,) = large.measure(quick=True)["rows"]
     assert row["command"] == "import" and row["said"]["parts"] == 1253
+
+
+def test_a_manual_is_read_as_a_tree_of_parts() -> None:
+    """Parts that are equal count as one kind; a step may name what is joined already."""
+    chair = {"parts_ct": 5, "geometric_equivalence_relation": {"1": ["2", "3"], "0,1": ["0,2"]}}
+    kinds = manuals.kinds_of(chair)
+    assert kinds == [0, 1, 1, 1, 4]
+    whole = frozenset({(0, 1), (1, 3), (4, 1)})
+    one_leg, two = frozenset({(0, 1), (1, 1)}), frozenset({(0, 1), (1, 2)})
+    assert manuals.manual([["0", "3"], "1", "2", "4"], kinds) == {one_leg, whole}
+    assert manuals.manual([["0,1", "2"], "3", "4"], kinds) == {two, whole}
+    assert manuals.f1({one_leg, whole}, {one_leg, whole}) == 1.0
+    assert manuals.f1({one_leg, whole}, {two, whole}) == 0.5
+
+
+def test_what_takes_most_new_branches_for_its_time_is_chosen() -> None:
+    taken = {
+        name: np.packbits(np.array(bits, bool))
+        for name, bits in {
+            "wide": [1] * 20 + [0] * 4,
+            "inside": [1] * 10 + [0] * 14,
+            "own": [0] * 18 + [1] * 6,
+            "dear": [0] * 23 + [1],
+        }.items()
+    }
+    cost = {"wide": 2.0, "inside": 1.5, "own": 0.5, "dear": 0.15}
+    assert chosen(taken, cost) == {"wide", "own"}
+    assert chosen({name: taken[name] for name in ("inside", "dear")}, cost) == {"inside", "dear"}
+    assert chosen({"dear": taken["dear"]}, {"dear": 0.3}) == set()
+
+
+def test_a_function_is_listed_once_where_none_of_its_cases_is_kept() -> None:
+    out = {"a.py::one[1]", "a.py::one[2]", "a.py::two[1]"}
+    assert listed(out, {"a.py::two[2]"}) == ["a.py::one", "a.py::two[1]"]

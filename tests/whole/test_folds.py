@@ -18,6 +18,7 @@ from factory.apps.exports.program_text import write_program
 from factory.apps.few_robots.folding import Line, fold, kept_apart, line_of, lines_of_labels
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
 from factory.support.errors import InputError, RunError
+from factory.support.settings import Settings
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.history import firings, legal_marking
 from factory.theory.nets.marked import MarkedNet, marked
@@ -26,6 +27,7 @@ from factory.theory.nets.verify import proved, verify
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.programs import program_of
 from tests.fold_values import (
+    fold_layout,
     inserted,
     lines_of_one_side,
     pairs_of_tours,
@@ -392,3 +394,9 @@ def test_programs_of_a_robot_with_two_tours() -> None:
         ]
     )
     assert "next" not in write_program(program_of(factory, 0))
+
+
+@pytest.mark.parametrize("seed", [179])
+def test_folds_are_laid_out(seed: int) -> None:
+    """Seed 139: a pile overlapped the housing as it came back to its tool."""
+    assert fold_layout(seed, Settings()).certificate is not None

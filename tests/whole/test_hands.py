@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 import factory
@@ -12,8 +16,11 @@ from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.hands.in_the_way import IN_THE_WAY
+from factory.floor.layout.hands.misses import THERE, NoGrip
 from factory.floor.layout.layout import Layout
-from tests.paths import EXAMPLES
+from factory.pipeline import read
+from tests.paths import EXAMPLES, ROOT
 
 AT_MOST_MM = 0.1
 """Nothing that is drawn is deeper in anything."""
@@ -70,3 +77,71 @@ def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
         run = watched(simulation, (), 60.0)
         codes = {failure.code for failure in run.verdict.failures}
         assert codes & ({"GripGap"} if way < 0 else {"Contact", "Dropped"}), (robot, codes)
+
+
+BOX = """root = r; r = mate ( a, b ); a = mate ( low, left, right, front, rear, lid );
+low = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.005) );
+left = atomic ( box = (0.01, 0.06, 0.03), pos = (-0.025, 0, 0.025) );
+right = atomic ( box = (0.01, 0.06, 0.03), pos = (0.025, 0, 0.025) );
+front = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, -0.025, 0.025) );
+rear = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, 0.025, 0.025) );
+lid = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.045) );
+b = atomic ( box = (0.03, 0.03, 0.02), pos = (0.06, 0, 0.01) )"""
+"""Walls that are lowered one after the other, by robots from either side."""
+
+
+def laid_out(text: str, folder: Path) -> Layout:
+    """A product laid out with hands."""
+    file = folder / "product.pag"
+    file.write_text(text)
+    return read(file).layout
+
+
+@pytest.mark.parametrize("distributed", [False])
+def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path: Path) -> None:
+    asked = RunRequest(units=2, jitter=0.3, seed=1, distributed=distributed)
+    run = watched(Simulation(laid_out(BOX, tmp_path), asked), (), 60.0)
+    assert run.succeeded, run.verdict.failures
+    assert run.products == 2
+
+
+GEARBOX = ROOT / "examples" / "gearbox.pag"
+
+
+def found(file: Path) -> tuple[NoGrip, ...]:
+    return read(file).no_grips
+
+
+@cache
+def of_the_gearbox() -> tuple[NoGrip, ...]:
+    """Of the gearbox whose shafts have their gears before they are lowered into the tub."""
+    text = GEARBOX.read_text()
+    for shaft, gear, whole in (("long", "pinion", "input"), ("short", "gear", "output")):
+        text = text.replace(f"{shaft}_shaft, {gear},", f"{whole},", 1)
+        text += f";\n{whole} = mate ( {shaft}_shaft, {gear} )"
+    with TemporaryDirectory() as folder:
+        copytree(GEARBOX.with_suffix(""), Path(folder) / "gearbox")
+        file = Path(folder) / "gearbox.pag"
+        file.write_text(text)
+        return found(file)
+
+
+@pytest.mark.parametrize("name", ["output"])
+def test_a_miss_is_met_by_all_that_it_names(name: str) -> None:
+    grip = next(grip for grip in of_the_gearbox() if grip.label == name)
+    assert {miss.kind for miss in grip.misses} == {"below", "behind", "above"}
+    for miss in grip.misses:
+        assert miss.at is not None and miss.obstacles
+        assert np.abs(miss.tried - miss.at).max(axis=1).min() < 1e-6
+        for obstacle in miss.obstacles:
+            if not obstacle.part:
+                assert obstacle.why in ("weak", "hands", "feeder")
+                continue
+            low = np.maximum(obstacle.ways[:, 0], obstacle.bodies[:, 0])
+            high = np.minimum(obstacle.ways[:, 1], obstacle.bodies[:, 1])
+            assert len(low) and (high > low).all()
+            assert obstacle.part in (*grip.parts, *grip.beside)
+
+
+def test_every_obstacle_of_a_hand_has_words() -> None:
+    assert {*THERE} == {*IN_THE_WAY}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.apps.exports.binary import beside
 from factory.support.extensions import extensions
 from tests.command_line import Terminal
 from tests.paths import PAPER
@@ -35,3 +36,10 @@ def test_a_package_that_changed_is_built_with(
         (file,) = (tmp_path / "gluing2").rglob(name)
         file.write_text(file.read_text() + "\n")
         assert not again(lines(run, PAPER, "-o", tmp_path / "x")), name
+
+
+def test_no_binary_lies_beside_a_device_or_upon_the_mjcf(tmp_path: Path) -> None:
+    assert beside(Path("/dev/null")) is None
+    assert beside(tmp_path) is None
+    assert beside(tmp_path / "m.xml") == tmp_path / "m.mjb"
+    assert beside(tmp_path / "m.mjb") == tmp_path / "m.mjb.mjb"

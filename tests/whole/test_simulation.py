@@ -10,13 +10,14 @@ import pytest
 import factory
 from factory.engine.record.state import State
 from factory.engine.simulation.distributed import DistributedSupervisor
+from factory.engine.simulation.mujoco.fast import neighbours
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from tests.good_runs import random_marking
 from tests.layout_values import Drawn, random_layout
 from tests.pag_texts import PAPER, laid_out
-from tests.simulation_values import ready
+from tests.simulation_values import layout_of, ready
 
 
 @pytest.fixture(scope="module")
@@ -145,3 +146,17 @@ def test_only_what_is_joined_may_touch() -> None:
     assert inspection._joined(*geoms) == join.label
     inspection.joining = {}
     assert inspection._joined(*geoms) is None
+
+
+def test_an_event_that_is_not_enabled_cannot_fire() -> None:
+    """Planted fault: the supervisor is made to end an operation that has not begun."""
+    simulation = Simulation(layout_of("paper"), RunRequest("ideal", units=1))
+    sub3 = simulation.layout.factory.by_label["sub3"].index
+    with pytest.raises(AssertionError, match="not all are enabled that fire: sub3_e"):
+        simulation.supervisor._fire([], [sub3])
+
+
+def test_no_more_is_simulated_than_was_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(neighbours, "FEW", 0)  # in small factories, too
+    run = ready("paper", units=5).run(max_time=1.23)
+    assert run.sim_time_s == pytest.approx(1.23) and run.trouble is not None

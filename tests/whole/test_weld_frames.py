@@ -10,6 +10,8 @@ from factory.engine.mjcf.weld_frames import gaps
 from factory.engine.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.examples import without_hands
+from tests.good_runs import random_marking
+from tests.simulation_values import layout_of, ready
 
 
 @pytest.fixture(scope="module", params=["paper", "gearbox"])
@@ -49,3 +51,16 @@ def test_a_holder_with_a_joint_of_another_kind_is_refused() -> None:
     check_holders(rolls, np.array([], int))
     with pytest.raises(ValueError, match="arm holds parts and does more than slide"):
         check_holders(rolls, np.array([0]))
+
+
+@pytest.mark.parametrize("seed", [1])
+def test_a_run_from_a_marking_begins_with_what_robots_hold(seed: int) -> None:
+    """Where the welds hold it: nothing jumps."""
+    start = random_marking(layout_of("paper"), seed)
+    world = ready("paper", start=start).physical
+    places = world.d.xpos.copy()
+    for _ in range(20):
+        world.advance(1)
+    held = [body for held in world.parts.holdings.in_hands().values() for body in held.values()]
+    assert np.abs(world.d.xpos[held] - places[held]).max(initial=0.0) < 1e-4
+    assert not world.inspection.unintended

@@ -2,16 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 import pytest
 
 from factory.apps.live.interventions import Interventions
+from factory.engine.mjcf.masks import NOBODY
+from factory.engine.simulation.mujoco.courses import Course
+from factory.engine.simulation.mujoco.fast import neighbours, strides
+from factory.engine.simulation.mujoco.fast.strides import Strides
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.clearance import certify
+from factory.floor.mating.mating import matings
+from factory.pipeline import all_templates
+from factory.support.engine import mujoco
 from factory.support.errors import InputError
-from tests.simulation_values import FINE, layout_of, ready
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.plant.approaches import MARGIN
+from tests.layout_values import with_visits
+from tests.simulation_values import FENCE, FINE, laid_out_with_lifts, layout_of, ready
 
 Name = Literal["mujoco", "ideal"]
 WORLDS: tuple[Name, ...] = ("ideal",)
@@ -60,3 +74,86 @@ def test_pushes_end_when_their_time_is_over() -> None:
         lasted += world.d.xfrc_applied[bodies, :3].any(axis=1)
     assert lasted.tolist() == [10, 25]
     assert world.hooks.before_step == []
+
+
+def test_a_stroke_too_short_fails_the_certificate() -> None:
+    """Planted fault: what is lowered comes only 5 mm above the others."""
+    layout = laid_out_with_lifts(FENCE)
+    factory = layout.factory
+    operations = tuple(
+        o
+        if o.lowered < 0
+        else replace(o, approach=replace(o.approach, stroke=o.approach.stroke - MARGIN + 0.005))
+        for o in factory.operations
+    )
+    lower = with_visits(replace(layout, factory=replace(factory, operations=operations)))
+    assert certify(layout).holds
+    faults = certify(lower).faults
+    assert any("comes 5.0 mm over" in fault.message for fault in faults)
+
+
+def test_a_catalogue_without_lifts_is_told() -> None:
+    from factory.theory.compiler.compiler import compile_pag
+    from tests.pag_values import catalogue
+
+    templates = all_templates()
+    pag = read_pag(FENCE, templates)
+    found = matings(expand(pag, templates), product_geometry(pag)).approaches
+    with pytest.raises(InputError, match="must be lowered, and a 'dot' has no lift"):
+        compile_pag(pag, templates, catalogue(), found)
+
+
+def solid_bodies(m: mujoco.MjModel) -> np.ndarray:
+    """The bodies that can collide, by the masks of their geoms, which nothing is left out of."""
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    return np.unique(m.geom_bodyid[solid])
+
+
+def boxes(m: mujoco.MjModel, d: mujoco.MjData, bodies: np.ndarray) -> np.ndarray:
+    """The boxes (n, 2, 3) that the engine's broad phase has for bodies, in the world's axes."""
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    turn = d.geom_xmat.reshape(-1, 3, 3)
+    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0]
+    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
+    found = np.empty((m.nbody, 2, 3))
+    found[:, 0], found[:, 1] = np.inf, -np.inf
+    np.minimum.at(found[:, 0], m.geom_bodyid[solid], (middle - half)[solid])
+    np.maximum.at(found[:, 1], m.geom_bodyid[solid], (middle + half)[solid])
+    return np.asarray(found[bodies])
+
+
+def within_boxes(simulation: Simulation) -> bool:
+    """Whether all that holders have is within the boxes that they are to sweep."""
+    world = simulation.physical
+    m, d, stepping_ = world.m, world.d, world.motion.stepping
+    assert isinstance(stepping_, Strides)
+    mujoco.mj_kinematics(m, d)
+    code, bodies = world.parts.masks.code, solid_bodies(m)
+    bodies = bodies[code[bodies] != NOBODY]
+    low, high = boxes(m, d, bodies).transpose(1, 0, 2)
+    least, most = (corners.T[code[bodies]] for corners in stepping_._neighbours.boxes())
+    return bool((least <= low[:, :2]).all() and (high[:, :2] <= most).all())
+
+
+@pytest.mark.parametrize(("name", "given"), [("tee", {}), ("bar", {})])
+def test_what_a_holder_has_is_within_its_box(
+    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(neighbours, "FEW", 0)  # in small factories, too
+    simulation = ready(name, **given)
+    while simulation.physical.time < 8.0:
+        for _ in range(10):
+            simulation.supervisor.step()
+        assert within_boxes(simulation)
+
+
+def test_there_is_room_for_so_many_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strides, "ROOM", 42)
+    cache = ready("paper").physical.motion.stepping
+    assert isinstance(cache, Strides)
+    still = np.zeros((2, 1))
+    for number in range(100):
+        course = cache.course(number % 7, lambda: Course(still, still, np.zeros((1, 4, 3)), False))
+        again = cache.course(number % 7, lambda: pytest.fail("it was forgotten"))
+        assert again is course
+        assert 1 <= len(cache._courses) <= 42 // 16

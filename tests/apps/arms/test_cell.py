@@ -19,6 +19,7 @@ from factory.floor.layout.coordinating import with_machines
 from factory.pipeline import Project, all_templates
 from factory.theory.lang import read_pag
 from factory.theory.nets.verify import verify
+from tests.apps.arms.test_own_arm import BOX, own
 from tests.arm_cells import SMALL, cell, refusal
 from tests.command_line import Terminal, spawn
 
@@ -150,3 +151,18 @@ def test_three_arms_have_no_room() -> None:
 def assert_layout(found: tuple[Diagnostic, ...], said: str, hint: str) -> None:
     (why,) = found
     assert why.code == "Layout" and said in why.message and hint in why.hint
+
+
+__all__ = ["own"]
+
+
+def test_an_arm_of_a_user_is_in_the_log(own: Path, tmp_path: Path, run: Terminal) -> None:
+    """With its meshes, and with what it leaves out of contact."""
+    file, log = tmp_path / "box.pag", tmp_path / "box.log"
+    file.write_text(BOX)
+    done = run("run", file, "--arm", own, "--units", "1", "--log", log, "--json")
+    assert done.status == 0, done.err
+    for path in (own, tmp_path / "shapes" / "link.stl"):
+        path.unlink()
+    judged = run("monitor", log, "--json")
+    assert judged.status == 0 and judged.json["verdict"]["succeeded"], judged.err

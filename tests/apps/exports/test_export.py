@@ -12,6 +12,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 from typing import Any
@@ -21,13 +22,16 @@ import numpy as np
 import pytest
 
 from factory.apps.exports import exporters
+from factory.apps.exports.floor_sheet import write_svg
 from factory.apps.exports.subject import file_name
 from factory.apps.exports.svg import draw_net
 from factory.apps.exports.swimlanes import swimlanes
 from factory.apps.log import read_log
+from factory.floor.layout.layout import Layout
 from factory.floor.modes.modes import operation_modes
 from tests.command_line import Terminal
 from tests.export_values import LAMP, kept_log, made, project
+from tests.layout_values import many_layouts, paper_layout, row_of_inserts
 from tests.net_values import PHILOSOPHERS, net_from, random_marked_net
 from tests.paths import PAPER, ROOT, files_in
 
@@ -258,3 +262,47 @@ def test_what_is_written_is_said(run: Terminal, out: Path) -> None:
     )
     done = run("export", PAPER, "--format", "stl", "-o", out / "all")
     assert done.out == f"stl: {out / 'all'}, {len(files_in(out / 'all'))} files\n"
+
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+def drawn(layout: Layout) -> ElementTree.Element:
+    return ElementTree.fromstring(write_svg(layout).encode())
+
+
+def group(root: ElementTree.Element, name: str) -> ElementTree.Element:
+    return next(g for g in root.iter(f"{SVG}g") if g.get("id") == name)
+
+
+def texts(element: ElementTree.Element) -> list[str]:
+    return [t.text or "" for t in element.iter(f"{SVG}text")]
+
+
+@pytest.mark.parametrize("seed", [None, *range(3)])
+def test_everything_is_drawn(seed: int | None) -> None:
+    layout = paper_layout() if seed is None else many_layouts(25, range(seed, seed + 1))[0]
+    root, factory = drawn(layout), layout.factory
+    shown = texts(group(root, "labels"))
+    assert {robot.name for robot in factory.robots} <= set(shown)
+    assert {leaf.label for leaf in factory.leaves} <= set(shown)
+    joined = {o.label for o in factory.operations if len(o.robots) > 1}
+    assert joined <= set(shown)
+    paths = [p for p in group(root, "guidepaths") if p.get("class") == "path"]
+    assert len(paths) == len(factory.robots)
+    assert len(group(root, "parts")) == len(factory.leaves)
+    outlines = [p for p in group(root, "outfeed") if p.get("class") == "product"]
+    assert len(outlines) == len(factory.leaves)
+
+
+def test_a_tall_floor_has_its_legend_beside_it() -> None:
+    layout = paper_layout()
+    tall = replace(layout, floor=(-0.5, 0.5, -3.0, 3.0))
+    for shown, beside in ((layout, False), (tall, True)):
+        root = drawn(shown)
+        floor = next(r for r in root.iter(f"{SVG}rect") if r.get("class") == "floor")
+        words = next(t for t in root.iter(f"{SVG}text") if t.text == "outfeed")
+        right = float(floor.get("x", 0)) + float(floor.get("width", 0))
+        assert (float(words.get("x", 0)) > right) == beside
+    assert "tool" in texts(group(drawn(layout), "sheet"))
+    assert "tool" not in texts(group(drawn(row_of_inserts()), "sheet"))

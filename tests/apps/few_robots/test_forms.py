@@ -3,26 +3,44 @@ the same, the net is proved as before, and the choice is the best for what it go
 
 from __future__ import annotations
 
+import random
 from dataclasses import replace
+from itertools import islice
+from pathlib import Path
 
 import pytest
 
 from factory.apps.few_robots.aim import Aim
-from factory.apps.few_robots.forms import FormsTask, best_forms
-from factory.apps.few_robots.lines import Admitted
+from factory.apps.few_robots.forms import FormsTask, best_forms, joins
+from factory.apps.few_robots.lines import Admitted, Shift
 from factory.apps.few_robots.search import allocated
+from factory.apps.few_robots.sharing import with_branches
+from factory.apps.log.plan_file import PLAN_NAME, plan_files, read_plan
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.clearance import certify
 from factory.floor.layout.durations import Pace
-from factory.pipeline import read
+from factory.floor.layout.saved import LayoutTable
+from factory.floor.layout.shapes import payload_boxes
+from factory.floor.mating.mating import judged
+from factory.pipeline import Project, read
+from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.resources import templates_folder
+from factory.support.settings import Settings
+from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang.template_reader import load_templates
+from factory.theory.nets.marked import marked
+from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG
-from factory.theory.problem.plan import THIRD
+from factory.theory.problem.plan import THIRD, Plan
 from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
 from tests.pag_values import TEMPLATES as OWN
 from tests.paths import EXAMPLES
+from tests.random_products import random_product
+from tests.state_space import explored
 
 TEMPLATES = {**OWN, **load_templates([templates_folder()])}
 """The shipped ones, and those that random PAGs use beside them."""
@@ -74,3 +92,88 @@ def test_hands_are_given_up_for_the_robots_that_are_asked_for(run: Terminal) -> 
     assert done.status == 0, done.err
     assert done.json["robots"] == 7
     assert "NoGrip" in {warning["code"] for warning in done.json["warnings"]}
+
+
+FEW, MANY = (4, 8, 10, 16, 101, 691), (7, *range(100, 1100))
+"""Seeds: the few have forms, robots with several tours, and branches that are there twice."""
+
+
+def random_plan(project: Project, rng: random.Random) -> Project:
+    """A product by some plan: forms, lines, and a branch that is there several times."""
+    free = [
+        label
+        for node in project.pag.nodes
+        if project.templates[node.operation].instead and len(node.inputs) > 1
+        for label in joins(node)
+    ]
+    if rng.random() < 0.7:
+        forms = {label: rng.choice((THIRD, 0, 1)) for label in free if rng.random() < 0.5}
+        project = project.with_plan(Plan(forms))
+    base = judged(project.compiled, project.product)
+    if rng.random() < 0.7:
+        boxes = payload_boxes(base, project.product)
+        shift = Shift.of(base, project.catalogue, boxes, Pace.of(project.settings))
+        fillings = [f for f in islice(shift.fillings(1.3), 40) if shift.lines(f)]
+        if fillings:
+            project = project.with_plan(shift.plan(rng.choice(fillings)))
+    labels = [
+        x for robot in project.planned.robots[1:] for x in project.planned.deliveries(robot.index)
+    ]
+    for label in rng.sample(labels, min(2, len(labels))):
+        try:
+            return with_branches(project, [(label, rng.choice((2, 3)))])
+        except InputError:
+            continue
+    return project
+
+
+def check(seed: int, folder: Path) -> None:
+    """One random product by one random plan."""
+    file, rng = folder / "product.pag", random.Random(seed)
+    file.write_text(random_product(seed))
+    project = random_plan(read(file, (), Settings(timestep=0.001, substeps=1)), rng)
+    try:
+        layout = project.layout
+    except RunError as error:
+        assert error.diagnostics[0].code == "Layout"
+        return
+    factory = layout.factory
+    assert verify(factory.net).holds
+    truth = explored(marked(factory.net), 500) if len(factory.operations) < 12 else None
+    assert truth is None or truth.behaviour == (True, True, True)
+    when = {number: n for n, number in enumerate(factory.order)}
+    for robot in factory.robots:
+        steps = [when[number] for number in robot.operations]
+        assert steps == sorted(steps), "one unit is made operation by operation"
+    assert certify(layout).holds
+    units = 6 * factory.period
+    request = RunRequest("ideal", units, settings=project.settings, shown=False)
+    run = Simulation(layout, request).run()
+    assert run.refines_net and run.products == units
+    ticks = max(len(robot.operations) for robot in factory.robots) / factory.period
+    assert run.cycle_time_s == pytest.approx(
+        run.predicted_cycle_time_s, rel=0.005, abs=ticks * project.settings.tick
+    )
+    for path, content in plan_files(project, folder).items():
+        path.write_bytes(content)
+    kept, said = read_plan(folder / PLAN_NAME), list[Diagnostic]()
+    again = kept.project(kept.settings, kept.ground, said.append)
+    assert LayoutTable.of(again.layout) == LayoutTable.of(layout) and not said
+    assert again.layout.factory == factory and again.layout.certificate == layout.certificate
+    anew = replace(again, laid=None).layout
+    assert anew.factory == factory
+    assert (anew.guidepaths, anew.visits) == (layout.guidepaths, layout.visits)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", MANY)
+def test_a_thousand_plans(seed: int, tmp_path: Path) -> None:
+    check(seed, tmp_path)
+
+
+def test_a_plan_with_other_tours_is_refused() -> None:
+    project = read("examples/paper.pag")
+    with pytest.raises(InputError, match="6 tours"):
+        shared(project.compiled, Plan(turns=((0, 1),)), project.catalogue)
+    with pytest.raises(InputError, match="robots are named"):
+        shared(project.compiled, Plan(turns=((0, 1, 2, 3, 4, 9),)), project.catalogue)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 import sys
+from contextlib import closing
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,12 @@ import pytest
 
 from factory.apps.sweep import Recipe, points, pool, read_axes, summarise
 from factory.apps.sweep.grid import Value
+from factory.apps.sweep.pool import over_processes
 from factory.apps.sweep.store import COLUMNS, Store
 from factory.apps.sweep.sweeping import outcomes_of
 from factory.apps.sweep.work import FIGURES, Outcome
 from factory.pipeline import read
-from factory.support.errors import InputError
+from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from tests.command_line import Terminal
 from tests.deadly import Deadly
@@ -200,3 +202,21 @@ def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
 def test_columns_are_named_once() -> None:
     assert set(FIGURES) < set(COLUMNS)
     assert {"seed", "jitter", "world", "clearance", "reason", "row_time_s"} < set(COLUMNS)
+
+
+def squared(number: int) -> int:
+    if number < 0:
+        raise InputError(Diagnostic("BadValue", f"{number} is below 0"))
+    return number**2
+
+
+def test_results_come_with_the_numbers_of_their_items() -> None:
+    items = [5, 3, 9, 0]
+    with closing(over_processes(squared, items, 2)) as results:
+        found = {one.number: one.result for one in results}
+    assert found == {n: item**2 for n, item in enumerate(items)}
+
+
+def test_an_error_of_the_work_is_raised() -> None:
+    with pytest.raises(InputError, match="-1 is below 0"):
+        list(over_processes(squared, [2, -1], 1))
