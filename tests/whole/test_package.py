@@ -26,40 +26,18 @@ from tests.plan_puzzles import pinwheel, source
 
 WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
     (lambda p: factory.run(p, world="moojoco"), ("run", PAPER, "--world", "moojoco")),
-    (lambda p: factory.run(p, units=-1), ("run", PAPER, "--units", -1)),
-    (lambda p: factory.run(p, units=2.5), ("run", PAPER, "--units", 2.5)),
-    (lambda p: factory.run(p, seed=-1), ("run", PAPER, "--seed", -1)),
-    (lambda p: factory.run(p, jitter=2), ("run", PAPER, "--jitter", 2)),
-    (lambda p: factory.run(p, max_time=0), ("run", PAPER, "--max-time", 0)),
     (lambda p: factory.run(p, start="nowhere"), ("run", PAPER, "--from", "nowhere")),
     (
         lambda p: factory.run(p, distributed=True, spares=1),
         ("run", PAPER, "--distributed", "--spares", 1),
     ),
-    (lambda p: factory.Settings(clearance=-3), ("run", PAPER, "--clearance", -3)),
-    (lambda p: factory.Settings(speed=float("nan")), ("run", PAPER, "--speed", "nan")),
-    (lambda p: factory.lay_out(p, floor=(0, 3)), ("build", PAPER, "--floor", "0x3")),
-    *(
-        (lambda p, floor=floor: factory.lay_out(p, floor=floor), ("build", PAPER, "--floor", floor))
-        for floor in ("4", "4x3x2", "fourx3", "-4x3", "nanx3", "1e9x3", "\u0664x3", "")
-    ),
-    (lambda p: factory.lay_out(p, floor=(0.3, 0.3)), ("build", PAPER, "--floor", "0.3x0.3")),
-    (
-        lambda p: factory.lay_out(p, relay=True, tile=0.24),
-        ("build", PAPER, "--relay", "--tile", 0.24),
-    ),
-    (lambda p: factory.compile(p, robots=0), ("check", PAPER, "--robots", 0)),
+    (lambda p: factory.lay_out(p, floor="1e9x3"), ("build", PAPER, "--floor", "1e9x3")),
     (lambda p: factory.compile(p, robots=2), ("check", PAPER, "--robots", 2)),
     (lambda p: factory.compile(p, cycle=-1), ("check", PAPER, "--cycle", -1)),
     (lambda p: factory.compile(p, parallel={"sub9": 2}), ("check", PAPER, "--parallel", "sub9=2")),
     (lambda p: factory.build(p, wip=0), ("build", PAPER, "--wip", 0)),
     (lambda p: factory.export(p, "pnlm"), ("export", PAPER, "--format", "pnlm")),
     (lambda p: factory.export(p, "csv"), ("export", PAPER, "--format", "csv")),
-    (
-        lambda p: factory.export(p, "dot", of="nose"),
-        ("export", PAPER, "--format", "dot", "--of", "nose"),
-    ),
-    (lambda p: factory.analyze(p, second=["r99"]), ("analyze", PAPER, "--second", "r99")),
     (lambda p: factory.analyze(p, faster={"r1": -3}), ("analyze", PAPER, "--faster", "r1=-3")),
     (
         lambda p: factory.sweep(p, "a.db", {"sed": [1]}),
@@ -69,7 +47,6 @@ WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
         lambda p: factory.sweep(p, "a.db", {"jitter": [7]}),
         ("sweep", PAPER, "--vary", "jitter=7", "-o", "a.db"),
     ),
-    (lambda p: factory.render(p, "a.gif"), ("render", PAPER, "-o", "a.gif")),
     (
         lambda p: factory.render(p, "a.png", camera="nose"),
         ("render", PAPER, "-o", "a.png", "--camera", "nose"),

@@ -103,34 +103,6 @@ def inside_out() -> trimesh.Trimesh:
     return mesh
 
 
-def one_of_two_inside_out() -> trimesh.Trimesh:
-    return trimesh.util.concatenate([cube().apply_translation((0.3, 0, 0)), inside_out()])
-
-
-def wire_inside_out() -> trimesh.Trimesh:
-    """A frame of wire: 1 part in 200,000 of its box."""
-    rods = []
-    for way in range(3):
-        size = np.full(3, 2e-4)
-        size[way] = EDGE
-        rods.append(trimesh.creation.box(size).apply_translation(EDGE * np.eye(3)[way - 1]))
-    mesh = trimesh.util.concatenate(rods)
-    mesh.invert()
-    return mesh
-
-
-def half_inside_out() -> trimesh.Trimesh:
-    mesh = cube().apply_translation((0.3, 0, 0))
-    mesh.invert()
-    return trimesh.util.concatenate([cube(), mesh])
-
-
-def with_a_hole() -> trimesh.Trimesh:
-    mesh = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
-    mesh.update_faces(np.arange(len(mesh.faces)) != 7)
-    return mesh
-
-
 def with_a_sliver() -> trimesh.Trimesh:
     """A side of a cube is of three triangles, the next one has an edge past their corner."""
     mesh = cube()
@@ -168,10 +140,6 @@ TUBE = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24).volume
 MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
     (to_and_fro, "had triangles of inconsistent orientation", TUBE),
     (inside_out, "was inside out", TUBE),
-    (one_of_two_inside_out, "was inside out", TUBE + EDGE**3),
-    (half_inside_out, "was inside out", 2 * EDGE**3),
-    (wire_inside_out, "was inside out", 3 * EDGE * 4e-8),
-    (with_a_hole, "had slivers or small holes", TUBE),
     (with_a_sliver, "had slivers or small holes", EDGE**3),
     (cracked, "had cracks", TUBE),
     (two_sided, "had duplicate triangles", EDGE**3),
@@ -191,19 +159,17 @@ def test_faces_of_a_solid_are_zipped_where_they_divide_an_edge_differently() -> 
     assert zipped(vertices, open_box) is open_box
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb"])
 @pytest.mark.parametrize(
     ("make", "was", "volume"), MENDED, ids=lambda x: getattr(x, "__name__", "")
 )
 def test_what_is_nearly_closed_is_mended(
-    tmp_path: Path, make: Callable[[], trimesh.Trimesh], was: str, volume: float, kind: str
+    tmp_path: Path, make: Callable[[], trimesh.Trimesh], was: str, volume: float
 ) -> None:
     mesh = make()
-    drawn = mesh.copy().apply_transform(Y_UP) if kind == "glb" else mesh
-    content = drawn.export(file_type=kind, **({"digits": 12} if kind == "obj" else {}))
-    found = product(tmp_path, f"m.{kind}", content)
+    content = mesh.copy().apply_transform(Y_UP).export(file_type="glb")
+    found = product(tmp_path, "m.glb", content)
     (warning,) = found.warnings
-    assert warning.message == f"m.{kind} {was}; it was repaired" and not warning.hint
+    assert warning.message == f"m.glb {was}; it was repaired" and not warning.hint
     solid = found.solids["p"]
     assert solid.mass == pytest.approx(1000 * volume, rel=1e-4)
     assert solid.mesh is not None
