@@ -717,9 +717,7 @@ TABLE: dict[str, dict[str, tuple[str, Any]]] = {
         "the log says a contact of what is apart": (
             "Record",
             said(
-                unintended_contacts=1,
-                contacts=["r2/carriage - r6/carriage"],
-                contact_first_s=1.0,
+                unintended_contacts=1, contacts=["r2/carriage - r6/carriage"], contact_first_s=1.0
             ),
         ),
         "the log says 99 contacts of many": ("Record", figures(unintended_contacts=99)),
