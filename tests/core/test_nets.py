@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from factory.theory.nets.petri import PetriNet, Place, Transition
-from factory.theory.nets.threaded import Slot, ThreadedNet, Threads
+from factory.theory.nets.threaded import ThreadedNet, Threads
 from factory.theory.plant.factory import Factory
 from tests.pag_values import factory_of, paper
 from tests.token_game import enabled, follower
@@ -44,11 +44,10 @@ def test_what_may_not_fire_does_not() -> None:
         threads.fire((start,))
 
 
-@pytest.mark.parametrize("robots", [{(0, 0): 0, (1, 0): 1}])
-def test_a_robot_that_is_not_where_its_token_is_does_not_fire(robots: dict[Slot, int]) -> None:
+def test_a_robot_that_is_not_where_its_token_is_does_not_fire() -> None:
     """Elsewhere, nowhere, or where another is already."""
     net = ThreadedNet(_RING, ((((1, 0), (0, 0)),), (((0, 0), (1, 0)),)))
-    threads = Threads(net, robots, (1,))
+    threads = Threads(net, {(0, 0): 0, (1, 0): 1}, (1,))
     threads.marked[:] = bytes([1, 0])
     with pytest.raises(AssertionError, match="not legal"):
         threads.fire((1,))

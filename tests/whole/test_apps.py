@@ -33,10 +33,8 @@ def test_a_variant_that_no_app_gives_is_refused_by_name() -> None:
     assert "platen, relay" in str(refused.value)
 
 
-@pytest.mark.parametrize("given", ["platen"])
-def test_what_is_no_app_of_its_own_is_refused(
-    given: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_app_of_its_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = "platen"
     monkeypatch.setattr(apps, "extensions", lambda kind: {"mine": given})
     apps.apps.cache_clear()
     try:
@@ -146,7 +144,6 @@ def _forget() -> None:
     commands.places.cache_clear()
 
 
-@pytest.mark.parametrize("table", [{3: "module:hello"}])
-def test_a_table_of_an_app_has_places(table: Any) -> None:
+def test_a_table_of_an_app_has_places() -> None:
     with pytest.raises(TypeError, match="is no place"):
-        App("greeting", commands=table)
+        App("greeting", commands={3: "module:hello"})

@@ -163,9 +163,8 @@ FAULTS = (
 )
 
 
-@pytest.mark.parametrize("world", ["ideal"])
-def test_what_is_lost_is_made_again_for_its_unit(world: str) -> None:
-    simulation = simulated("babab", world, recovers=True, wip=3)
+def test_what_is_lost_is_made_again_for_its_unit() -> None:
+    simulation = simulated("babab", "ideal", recovers=True, wip=3)
     recovery = recover(simulation, Campaign(FAULTS))
     run = simulation.run()
     assert run.succeeded, run.verdict

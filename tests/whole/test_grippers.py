@@ -100,8 +100,8 @@ def test_jaws_that_close_too_little_or_too_far_fail_the_run(
     assert not run.succeeded and why in str(run.verdict), run.verdict
 
 
-@pytest.mark.parametrize("text", [LIFTED], ids=["on a lift"])
-def test_jaws_stay_within_the_boxes_that_were_certified(package: Path, text: str) -> None:
+def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
+    text = LIFTED
     made = project(package, text)
     simulation = Simulation(made.layout, RunRequest("mujoco", units=2, jitter=0.3, seed=2))
     boxes = {limb.name: limb for limb in limbs(made.layout, 2)}
@@ -125,8 +125,8 @@ def test_jaws_stay_within_the_boxes_that_were_certified(package: Path, text: str
     assert max(off) < 1e-4
 
 
-@pytest.mark.parametrize("up", [1], ids=["from below"])
-def test_the_strength_of_jaws_is_friction_at_both_faces(up: int) -> None:
+def test_the_strength_of_jaws_is_friction_at_both_faces() -> None:
+    up = 1
     jaws = tuple(
         Jaw(name, side, (-0.01, y, 0.0), (0.01, y + 0.004, 0.02), 0.02, 0.1, 0.0, 0.0, 25.0, 0.4)
         for name, side, y in (("left", 1, 0.03), ("right", -1, -0.034))

@@ -97,9 +97,8 @@ def laid_out(text: str, folder: Path) -> Layout:
     return read(file).layout
 
 
-@pytest.mark.parametrize("distributed", [False])
-def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path: Path) -> None:
-    asked = RunRequest(units=2, jitter=0.3, seed=1, distributed=distributed)
+def test_hands_from_either_side_wait_for_each_other(tmp_path: Path) -> None:
+    asked = RunRequest(units=2, jitter=0.3, seed=1, distributed=False)
     run = watched(Simulation(laid_out(BOX, tmp_path), asked), (), 60.0)
     assert run.succeeded, run.verdict.failures
     assert run.products == 2
@@ -126,9 +125,8 @@ def of_the_gearbox() -> tuple[NoGrip, ...]:
         return found(file)
 
 
-@pytest.mark.parametrize("name", ["output"])
-def test_a_miss_is_met_by_all_that_it_names(name: str) -> None:
-    grip = next(grip for grip in of_the_gearbox() if grip.label == name)
+def test_a_miss_is_met_by_all_that_it_names() -> None:
+    grip = next(grip for grip in of_the_gearbox() if grip.label == "output")
     assert {miss.kind for miss in grip.misses} == {"below", "behind", "above"}
     for miss in grip.misses:
         assert miss.at is not None and miss.obstacles

@@ -215,10 +215,10 @@ shade = atomic ( box = (30, 30, 30), pos = (0, 0, 35) );
 globe = atomic ( sphere = 20, pos = (0, 0, 40) )"""
 
 
-@pytest.mark.parametrize("higher", [5.0])
-def test_products_end_at_one_height(shaped: Path, run: Terminal, higher: float) -> None:
+def test_products_end_at_one_height(shaped: Path, run: Terminal) -> None:
     """A product that is higher by so many millimetres would hang over the tray that takes it
     away."""
+    higher = 5.0
     high = f"other = atomic ( box = ( 0.2, 0.1, {0.02 - higher / 1e3:.4f} ),"
     high += f" pos = ( 0, 0, {0.01 + higher / 2e3:.4f} ) );"
     shaped.write_text(SHAPED.replace("mate ( base, z )", "mate ( other, z )") + "\n" + high)

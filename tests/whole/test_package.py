@@ -79,10 +79,9 @@ def test_a_wrong_call_gives_the_code_of_the_command(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("floor", [4], ids=repr)
-def test_a_floor_is_two_lengths(floor: Any) -> None:
+def test_a_floor_is_two_lengths() -> None:
     with pytest.raises(factory.InputError, match="is not two positive lengths"):
-        factory.lay_out(PAPER, floor=floor)
+        factory.lay_out(PAPER, floor=4)
 
 
 def test_a_floor_is_given_in_numbers_or_as_a_command_takes_it() -> None:

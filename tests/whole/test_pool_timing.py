@@ -53,10 +53,9 @@ def test_the_papers_pools() -> None:
     assert most_inside(factory, marked(factory.net)) == dict(part_pool(factory))
 
 
-@pytest.mark.parametrize("wip", [-1])
-def test_wip_below_one_is_refused(wip: int) -> None:
+def test_wip_below_one_is_refused() -> None:
     with pytest.raises(InputError, match="BadValue"):
-        part_pool(factory_of(paper()), wip)
+        part_pool(factory_of(paper()), -1)
 
 
 def test_the_papers_cycle_time() -> None:
@@ -87,8 +86,8 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     assert frozenset(found.circuit) in gears
 
 
-@pytest.mark.parametrize("rows", [[("a", "b", 1)]])
-def test_only_live_marked_graphs_have_a_cycle_time(rows: list[tuple[str, str, int]]) -> None:
+def test_only_live_marked_graphs_have_a_cycle_time() -> None:
+    rows = [("a", "b", 1)]
     with pytest.raises(ValueError, match=r"live marked graph|no circuit"):
         max_cycle_ratio(net_from(rows), [0.0] * len(rows))
 

@@ -79,9 +79,9 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
         link.at(label["part1"], 0)
 
 
-@pytest.mark.parametrize("carrier", [True])
-def test_a_program_that_reads_more_is_refused(paper: Layout, carrier: bool) -> None:
+def test_a_program_that_reads_more_is_refused(paper: Layout) -> None:
     """Planted fault: r3, or r4, waits until r1 shows something, too."""
+    carrier = True
     supervisor = linked(paper)
     process = supervisor.processes[2 if carrier else 3]
     steps = [replace(s, until=((0, "nopart"), *s.until)) for s in process.program.steps]

@@ -128,10 +128,9 @@ def dropped(run: Run, robot: str, label: str) -> None:
     assert max((event.t for event in run.events), default=0.0) <= run.sim_time_s - FALL + 0.011
 
 
-@pytest.mark.parametrize("more", [{"distributed": True}], ids=str)
-def test_a_tip_of_a_tenth_of_its_pull(monkeypatch: pytest.MonkeyPatch, more: Any) -> None:
+def test_a_tip_of_a_tenth_of_its_pull(monkeypatch: pytest.MonkeyPatch) -> None:
     weaken(monkeypatch, 0.1)
-    dropped(watched(ready("paper", **more)), "r3", "sub1")
+    dropped(watched(ready("paper", **{"distributed": True})), "r3", "sub1")
 
 
 def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,9 +14,9 @@ from factory.apps.arms.travel import travels
 from tests.arm_models import ANY_TOOL_SPEED, PACE, both, configurations, down, random_way, shipped
 
 
-@pytest.mark.parametrize("distance", [0.95])
-def test_what_is_too_far_is_so_many_millimetres_short(distance: float) -> None:
+def test_what_is_too_far_is_so_many_millimetres_short() -> None:
     """The edge is reached, and 1 mm beyond it is not."""
+    distance = 0.95
     chain = shipped("six")
     place = np.array([0.6, 0.8, 0.0]) * distance + [0.0, 0.0, 0.15]
     why = diagnose_reach(chain, place, down(0.4))

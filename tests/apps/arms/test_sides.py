@@ -46,8 +46,8 @@ def drawer() -> Layout:
     return project(DRAWER, "six").layout
 
 
-@pytest.mark.parametrize("along", [(0.0, -1.0)])
-def test_an_end_goes_to_a_side_and_then_up(along: tuple[float, float]) -> None:
+def test_an_end_goes_to_a_side_and_then_up() -> None:
+    along = (0.0, -1.0)
     way = np.array([*along, 0.0])
     rise = Rise.beside(way, 0.1, 0.08)
     places = rise.places

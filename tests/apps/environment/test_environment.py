@@ -34,16 +34,15 @@ def episode(env: FactoryEnv, seed: int) -> tuple[float, list[str], dict[str, Any
     return paid, refused, info
 
 
-@pytest.mark.parametrize("name", ["paper"])
-def test_the_baseline_makes_all_units(name: str) -> None:
-    paid, refused, info = episode(env_of(name, units=2, jitter=0.3, interval=0.05), 5)
+def test_the_baseline_makes_all_units() -> None:
+    paid, refused, info = episode(env_of("paper", units=2, jitter=0.3, interval=0.05), 5)
     assert (paid, refused, info["products"], info["tripped"]) == (2.0, [], 2, False)
 
 
-@pytest.mark.parametrize("seed", [2])
-def test_legal_jobs_are_not_refused_and_others_are(seed: int) -> None:
+def test_legal_jobs_are_not_refused_and_others_are() -> None:
     """One robot at a time takes up or gives up a job, drawn by chance; grips follow the baseline,
     so what is refused is the job."""
+    seed = 2
     env, rng = env_of("paper", units=2, interval=0.05), np.random.default_rng(seed)
     seen, info = env.reset(seed=seed)
     agent, tried = Programs(env), {True: 0, False: 0}

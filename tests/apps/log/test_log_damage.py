@@ -102,11 +102,9 @@ def is_refused(path: Path, words: str = "") -> bool:
     return False
 
 
-@pytest.mark.parametrize(("value", "harmless"), [(-1, "")], ids=["negative"])
-def test_damaged_headers(
-    log: Path, tmp_path: Path, value: object, harmless: str, tried: Callable[[Path], list[int]]
-) -> None:
+def test_damaged_headers(log: Path, tmp_path: Path, tried: Callable[[Path], list[int]]) -> None:
     """What no run can have is refused when it is read, and named; no command fails at the rest."""
+    value, harmless = -1, ""
     header, blocks = taken_apart(log)
     bad, passed = tmp_path / "bad.log", []
     for name in CHECKED:
@@ -181,8 +179,8 @@ def test_a_block_that_lacks_an_array(log: Path, tmp_path: Path, name: str) -> No
     assert is_refused(put_together(tmp_path / "bad.log", header, found), f"it has no '{name}'")
 
 
-@pytest.mark.parametrize("value", [10**6])
-def test_constraints_and_contacts_of_no_model(log: Path, value: int) -> None:
+def test_constraints_and_contacts_of_no_model(log: Path) -> None:
+    value = 10**6
     kept = read_log(log)
     for column in range(3):
         numbers = kept.active.values.copy()

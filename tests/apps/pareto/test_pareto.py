@@ -162,10 +162,11 @@ def test_without_layouts_there_is_nothing_to_run(run: Terminal) -> None:
     assert all(p["estimated_cycle_time_s"] > 0 for p in done.json["points"])
 
 
-@pytest.mark.parametrize("after", ["laying out"])
 def test_a_search_that_is_stopped_keeps_what_it_has(
-    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch, after: str
+    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    after = "laying out"
+
     def stop(_: StepBar, what: str, done: int, *words: object) -> None:
         if what == after and (done > 1 or "running" in what):
             raise KeyboardInterrupt

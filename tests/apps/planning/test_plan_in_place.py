@@ -89,9 +89,9 @@ def test_a_sheet_of_two_sides_is_said_to_bound_nothing(run: Terminal, tmp_path: 
     assert "%" not in done.err and "not convex" not in done.err
 
 
-@pytest.mark.parametrize("scale", [1 / 25.4])
-def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, scale: float) -> None:
+def test_a_unit_that_is_not_known_is_refused(tmp_path: Path) -> None:
     """A product of 17 or 1.7 inches, or of 21.5 or 1.7 cm."""
+    scale = 1 / 25.4
     code, message = refused(tmp_path, stool(), scale)
     assert code == "Unit"
     length = 430 * scale
@@ -101,20 +101,14 @@ def test_a_unit_that_is_not_known_is_refused(tmp_path: Path, scale: float) -> No
     assert max(p.solid.high[2] for p in source.parts) == pytest.approx(0.0254 * length, rel=1e-4)
 
 
-@pytest.mark.parametrize(("name", "scale", "answer", "status"), [("no", 1.0, "n\n", 2)])
 def test_on_a_terminal_the_user_is_asked(
-    run: Terminal,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    name: str,
-    scale: float,
-    answer: str,
-    status: int,
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    name, status = "no", 2
     parts = stool() if name == "unit" else {**stool(), "knob": block((0, 0, 450), (20, 20, 470))}
-    words = ("plan", folder_of(tmp_path / "parts", parts, scale), "-o", tmp_path / "out")
+    words = ("plan", folder_of(tmp_path / "parts", parts, 1.0), "-o", tmp_path / "out")
     monkeypatch.setattr("factory.apps.planning.command_line.asking.is_terminal", lambda: True)
-    monkeypatch.setattr("sys.stdin", io.StringIO(answer))
+    monkeypatch.setattr("sys.stdin", io.StringIO("n\n"))
     done = run(*words, "--no-look", "--seconds", 1)
     assert done.status == status, done.err
     asked = "unit of lengths" if name == "unit" else "plan them where they are?"

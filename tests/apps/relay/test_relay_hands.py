@@ -93,9 +93,9 @@ def hand_overs(layout: Layout) -> list[Operation]:
     return [o for o in layout.factory.operations if o.template.name == "relay"]
 
 
-@pytest.mark.parametrize("chain", [False])
-def test_giver_and_taker_hold_on_their_own_sides(chain: bool) -> None:
+def test_giver_and_taker_hold_on_their_own_sides() -> None:
     """Their pads are apart across the line, and what goes across to these by a clearance."""
+    chain = False
     layout = chained(4, "nb", 3) if chain else with_relays(4)
     for operation in hand_overs(layout):
         taker, giver = operation.robots

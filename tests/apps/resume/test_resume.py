@@ -81,10 +81,10 @@ def made(name: str) -> Simulation:
     return Simulation(layout_of(name), *request_of(name))
 
 
-@pytest.mark.parametrize("name", ["lamp"])
-def test_a_run_that_goes_on_is_the_same_to_the_last_bit(name: str, tmp_path: Path) -> None:
+def test_a_run_that_goes_on_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     """From any byte of its log, which nobody looked at until there: all that is logged after that
     is the same, and so are the figures in its end. One is of robots that run by themselves."""
+    name = "lamp"
     whole, log, simulation = tmp_path / "whole.log", tmp_path / "run.log", made(name)
     until = 450 * simulation.request.settings.tick
     with LogWriter(whole, simulation) as writer:

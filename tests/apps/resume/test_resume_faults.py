@@ -55,11 +55,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory, words: tuple[object, ...]) -
     return path
 
 
-@pytest.mark.parametrize("share", [0.5])
-def test_a_run_that_was_cut_off_is_gone_on_with(
-    whole: Path, tmp_path: Path, run: Terminal, share: float
-) -> None:
+def test_a_run_that_was_cut_off_is_gone_on_with(whole: Path, tmp_path: Path, run: Terminal) -> None:
     """It tells of all that failed, before and after, and its log is that of the whole run."""
+    share = 0.5
     data, path = whole.read_bytes(), tmp_path / "run.log"
     ends = block_ends(data)
     path.write_bytes(data[: ends[int(share * (len(ends) - 1))] + 9])

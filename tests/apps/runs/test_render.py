@@ -129,11 +129,11 @@ def test_a_frame_that_cannot_be_encoded_is_no_secret(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("ending", [".mkv"])
 def test_films_need_no_encoder_under_the_gpl(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where FFmpeg has no libx264 they are VP9: all frames, in order; and no encoder is named."""
+    ending = ".mkv"
     import av
 
     whole = av.codec.Codec
@@ -194,8 +194,8 @@ def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> No
     assert missing_parts(layout, iio.imread(tmp_path / "end.png")) == ["part2"]
 
 
-@pytest.mark.parametrize("look", [from_above])
-def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(look) -> None:
+def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks() -> None:
+    look = from_above
     long = np.array([(x, y, z) for x in (-3, 3) for y in (-0.5, 0.5) for z in (0, 0.2)], float)
     upright = look(long, Framing(9 / 16))
     turned = look(long[:, [1, 0, 2]], Framing(9 / 16))

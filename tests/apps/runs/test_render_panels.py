@@ -138,8 +138,8 @@ def test_what_a_robot_does_is_said_beside_its_ring(paper: Log) -> None:
     assert max(changed[:, side].mean() for side in beside) > 0.05
 
 
-@pytest.mark.parametrize("fuse", [True])
-def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
+def test_a_part_is_followed_from_its_feeder_to_the_dropoff() -> None:
+    fuse = True
     simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
     followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation), "part1")
     ranks, labels = [], []

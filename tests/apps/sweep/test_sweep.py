@@ -71,13 +71,10 @@ def test_a_run_that_fails_is_a_row_with_its_reason(
     assert (retried["there"], retried["there_failed"], retried["failed"]) == (0, 0, 3)
 
 
-@pytest.mark.parametrize("seeds", ["units=1"])
-def test_two_sweeps_may_begin_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seeds: str
-) -> None:
+def test_two_sweeps_may_begin_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One creates the tables after the other has opened the database."""
     database, recipe = tmp_path / "r.db", recipe_of()
-    other = recipe.identity(read_axes([seeds]))
+    other = recipe.identity(read_axes(["units=1"]))
     begun = []
 
     class Late(sqlite3.Connection):
