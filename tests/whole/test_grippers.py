@@ -101,8 +101,7 @@ def test_jaws_that_close_too_little_or_too_far_fail_the_run(
 
 
 def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
-    text = LIFTED
-    made = project(package, text)
+    made = project(package, LIFTED)
     simulation = Simulation(made.layout, RunRequest("mujoco", units=2, jitter=0.3, seed=2))
     boxes = {limb.name: limb for limb in limbs(made.layout, 2)}
     off = list[float]()
@@ -126,16 +125,15 @@ def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
 
 
 def test_the_strength_of_jaws_is_friction_at_both_faces() -> None:
-    up = 1
     jaws = tuple(
         Jaw(name, side, (-0.01, y, 0.0), (0.01, y + 0.004, 0.02), 0.02, 0.1, 0.0, 0.0, 25.0, 0.4)
         for name, side, y in (("left", 1, 0.03), ("right", -1, -0.034))
     )
-    clamp = Clamp(jaws, ((0.01, 0.01),), up)
+    clamp = Clamp(jaws, ((0.01, 0.01),), 1)
 
     def used(force: tuple[float, ...], moment: tuple[float, ...] = (0.0, 0.0, 0.0)) -> float:
-        """At the middle of the clamp, 10 mm over or under the pad."""
-        about = np.array(moment) + np.cross((0.0, 0.0, 0.01 * up), force)
+        """At the middle of the clamp, 10 mm over the pad."""
+        about = np.array(moment) + np.cross((0.0, 0.0, 0.01), force)
         return float(shares((clamp.gauge((1.0, 0.0)) @ [*force, *about])[None])[0])
 
     assert used((0.0, 0.0, -10.0)) == pytest.approx(10 / (2 * 0.4 * 25))

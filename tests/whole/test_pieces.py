@@ -118,13 +118,12 @@ def test_a_shape_is_decomposed_once_wherever_it_is(
     tmp_path: Path, library: list[int], cache: Path
 ) -> None:
     """In one product, and in the next; its bodies move with it. A mirror image is another shape."""
-    kind = "stl"
     arm = trimesh.creation.annulus(0.05, 0.1, 0.1)
     arm.vertices[:, 0] += 0.3 * arm.vertices[:, 2] + 0.7 * np.maximum(arm.vertices[:, 1], 0.02)
-    first = solid_of(tmp_path, arm, kind)
+    first = solid_of(tmp_path, arm, "stl")
     for seed in range(3):
         other = turned(arm, seed)
-        found = solid_of(tmp_path, other, kind)
+        found = solid_of(tmp_path, other, "stl")
         assert len(library) == 1
         assert len(found.pieces) == len(first.pieces) == 2
         for one, two in zip(first.pieces, found.pieces, strict=True):
@@ -133,7 +132,7 @@ def test_a_shape_is_decomposed_once_wherever_it_is(
                 np.linalg.norm(one - arm.vertices.mean(axis=0), axis=1), abs=1e-6
             )
     mirrored = arm.copy().apply_transform(np.diag([-1.0, 1, 1, 1]))
-    solid_of(tmp_path, mirrored, kind)
+    solid_of(tmp_path, mirrored, "stl")
     assert len(library) == 2
 
 

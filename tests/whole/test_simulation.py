@@ -80,10 +80,9 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
 
 
 def test_a_program_that_reads_more_is_refused(paper: Layout) -> None:
-    """Planted fault: r3, or r4, waits until r1 shows something, too."""
-    carrier = True
+    """Planted fault: r3 waits until r1 shows something, too."""
     supervisor = linked(paper)
-    process = supervisor.processes[2 if carrier else 3]
+    process = supervisor.processes[2]
     steps = [replace(s, until=((0, "nopart"), *s.until)) for s in process.program.steps]
     process.program = replace(process.program, steps=tuple(steps))
     with pytest.raises(AssertionError, match="reads robot 0, which is not in the mode of"):

@@ -130,7 +130,7 @@ def dropped(run: Run, robot: str, label: str) -> None:
 
 def test_a_tip_of_a_tenth_of_its_pull(monkeypatch: pytest.MonkeyPatch) -> None:
     weaken(monkeypatch, 0.1)
-    dropped(watched(ready("paper", **{"distributed": True})), "r3", "sub1")
+    dropped(watched(ready("paper", distributed=True)), "r3", "sub1")
 
 
 def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,19 +102,13 @@ def is_refused(path: Path, words: str = "") -> bool:
     return False
 
 
-def test_damaged_headers(log: Path, tmp_path: Path, tried: Callable[[Path], list[int]]) -> None:
-    """What no run can have is refused when it is read, and named; no command fails at the rest."""
-    value, harmless = -1, ""
+def test_damaged_headers(log: Path, tmp_path: Path) -> None:
+    """What no run can have is refused when it is read, and named."""
     header, blocks = taken_apart(log)
-    bad, passed = tmp_path / "bad.log", []
+    bad = tmp_path / "bad.log"
     for name in CHECKED:
-        put_together(bad, replaced(header, name.split("."), value), blocks)
-        if not is_refused(bad, name.partition(".")[0]):
-            passed.append(name)
-    assert passed == harmless.split()
-    for name in passed:
-        header = replaced(header, name.split("."), value)
-    assert not passed or set(tried(put_together(bad, header, blocks))) <= {0, 1, 2}
+        put_together(bad, replaced(header, name.split("."), -1), blocks)
+        assert is_refused(bad, name.partition(".")[0]), name
 
 
 @pytest.mark.parametrize(

@@ -165,10 +165,8 @@ def test_without_layouts_there_is_nothing_to_run(run: Terminal) -> None:
 def test_a_search_that_is_stopped_keeps_what_it_has(
     run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    after = "laying out"
-
     def stop(_: StepBar, what: str, done: int, *words: object) -> None:
-        if what == after and (done > 1 or "running" in what):
+        if what == "laying out" and done > 1:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(StepBar, "show", stop)
@@ -177,7 +175,7 @@ def test_a_search_that_is_stopped_keeps_what_it_has(
     assert done.status == 130, done.err
     assert done.codes == ["Interrupted"]
     assert done.json["points"]
-    assert done.json["complete"] == ("running" in after)
+    assert not done.json["complete"]
     written = files_in(out / "front")
     assert {str(out / "front" / name) for name in written} == set(done.json["files"])
     assert len(read_back(out / "front" / "p01" / "plan.json").plain.robots) >= 3

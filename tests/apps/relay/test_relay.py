@@ -4,7 +4,6 @@ as before, everything goes where it went, and the pace no longer depends on the 
 from __future__ import annotations
 
 from factory.apps.relay import relayed
-from factory.floor.layout.layout import Layout
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.theory.compiler.compiler import compile_pag
@@ -12,15 +11,11 @@ from factory.theory.compiler.expanding import expand, nodes_of
 from factory.theory.lang.template_reader import load_templates
 from factory.theory.problem.plan import Plan
 from factory.theory.problem.robot_types import load_catalogue
-from factory.theory.problem.template import Template
 from tests.layout_values import paper_layout, row_of_inserts
 
 SETTINGS = Settings()
 
 
-def templates_of(layout: Layout) -> dict[str, Template]:
-    used = {o.template.name: o.template for o in layout.factory.operations}
-    return {**load_templates([templates_folder()]), **used}
 
 
 def test_piles_and_the_product_are_handed_over() -> None:

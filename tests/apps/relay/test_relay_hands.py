@@ -11,13 +11,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from factory.apps.relay import relayed
-from factory.apps.relay.relaying import Room as RoomForLanes
-from factory.apps.relay.splitting import split
-from factory.apps.relay.ways import ways
 from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.durations import Pace
-from factory.floor.layout.embedding import certified
-from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.in_the_way import BESIDE
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
@@ -25,8 +19,6 @@ from factory.pipeline import read
 from factory.support.settings import Settings
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.robot_bodies import ARM_WIDTH
-from factory.theory.problem.robot_types import load_catalogue
-from tests.apps.relay.test_relay import templates_of
 
 SETTINGS = Settings()
 
@@ -77,26 +69,13 @@ def with_relays(seed: int) -> Layout:
     return relayed(plain(sawn(seed)), SETTINGS)
 
 
-@cache
-def chained(seed: int, label: str, number: int) -> Layout:
-    """A layout with so many relays, one after the other, on one way."""
-    found = plain(sawn(seed))
-    hands = Hands(found.factory, found.product, SETTINGS.acceleration)
-    room = RoomForLanes(found, Pace.of(SETTINGS), None, hands)
-    layout = room.layout(room.cuttable())
-    way, templates = ways(layout)[label], templates_of(layout)
-    found = split(layout, {label: way}, {label: number}, templates, load_catalogue())
-    return certified(found, None)
-
-
 def hand_overs(layout: Layout) -> list[Operation]:
     return [o for o in layout.factory.operations if o.template.name == "relay"]
 
 
 def test_giver_and_taker_hold_on_their_own_sides() -> None:
     """Their pads are apart across the line, and what goes across to these by a clearance."""
-    chain = False
-    layout = chained(4, "nb", 3) if chain else with_relays(4)
+    layout = with_relays(4)
     for operation in hand_overs(layout):
         taker, giver = operation.robots
         lanes, pads, arms = zip(*(_across(layout, robot) for robot in (taker, giver)), strict=True)

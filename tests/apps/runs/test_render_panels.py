@@ -139,8 +139,7 @@ def test_what_a_robot_does_is_said_beside_its_ring(paper: Log) -> None:
 
 
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff() -> None:
-    fuse = True
-    simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
+    simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=True))
     followed = Followed(simulation.world.m, MonitorSubject.of_run(simulation), "part1")
     ranks, labels = [], []
 
@@ -154,7 +153,7 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff() -> None:
     simulation.run([look])
     back = [k for k in range(1, len(ranks)) if ranks[k] < ranks[k - 1]]
     assert len(back) == 1 and ranks[back[0] - 1] == 3.0  # r1 carries three: it drops off
-    assert set(labels) == ({"part1", "sub1", "sub3"} if fuse else {"part1"})
+    assert set(labels) == {"part1", "sub1", "sub3"}
     assert ranks[0] == 0.0
 
 
