@@ -115,8 +115,7 @@ def test_jaws_stay_within_the_boxes_that_were_certified(package: Path) -> None:
         for name in ("left", "right"):
             limb, geom = boxes[f"{name}/jaw"], m.geom(f"r3/{name}/jaw").id
             at = turn.T @ (d.geom_xpos[geom] - d.xpos[foot])
-            if text == LIFTED:
-                at[2] -= d.xpos[m.body("r3/head").id, 2] - d.xpos[foot, 2]
+            at[2] -= d.xpos[m.body("r3/head").id, 2] - d.xpos[foot, 2]
             low, high = at - m.geom_size[geom], at + m.geom_size[geom]
             off.append(float(max((limb.low - low).max(), (high - limb.high).max())))
 
