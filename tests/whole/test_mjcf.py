@@ -14,17 +14,20 @@ import pytest
 import trimesh
 
 import factory
+from factory.apps.exports.binary import beside
 from factory.apps.exports.stock import model_files, written
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import Model
 from factory.engine.simulation.modelling import physical_model
 from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError
+from factory.support.extensions import extensions
 from factory.support.files import write_all
 from factory.support.settings import Settings
 from tests.command_line import Terminal
 from tests.examples import without_hands
-from tests.paths import ROOT, files_in
+from tests.paths import PAPER, ROOT, files_in
+from tests.plug_in import write_package
 
 SHAPES = """root = s; s = mate(box, cylinder, ball, wedge, flat, plain, shell, heavy);
 box = atomic ( box = (0.06, 0.04, 0.02), quat = (1, 2, 3, 4), density = 700 );
@@ -122,3 +125,35 @@ def assert_still(m: mujoco.MjModel) -> None:
     assert np.abs(d.xpos - start).max() < 1e-4
     assert np.abs(d.qvel).max() < 1e-3
     assert sum(w.number for w in d.warning) == 0
+
+
+def lines(run: Terminal, *words: object) -> str:
+    done = run("build", *words)
+    assert done.status == 0, done.err
+    return done.out
+
+
+def again(text: str) -> bool:
+    return "up to date" in text
+
+
+def test_a_package_that_changed_is_built_with(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    """One that is installed: its operation, its law, its robot type."""
+    write_package(tmp_path, installed=True, name="gluing2")
+    monkeypatch.syspath_prepend(tmp_path)
+    request.addfinalizer(extensions.cache_clear)
+    assert not again(lines(run, PAPER, "-o", tmp_path / "x"))
+    for name in ("dab.op", "laws.py", "dabber.xml", "catalogue.toml"):
+        assert again(lines(run, PAPER, "-o", tmp_path / "x"))
+        (file,) = (tmp_path / "gluing2").rglob(name)
+        file.write_text(file.read_text() + "\n")
+        assert not again(lines(run, PAPER, "-o", tmp_path / "x")), name
+
+
+def test_no_binary_lies_beside_a_device_or_upon_the_mjcf(tmp_path: Path) -> None:
+    assert beside(Path("/dev/null")) is None
+    assert beside(tmp_path) is None
+    assert beside(tmp_path / "m.xml") == tmp_path / "m.mjb"
+    assert beside(tmp_path / "m.mjb") == tmp_path / "m.mjb.mjb"

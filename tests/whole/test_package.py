@@ -18,7 +18,7 @@ import pytest
 import factory
 from factory.pipeline import read
 from factory.support import namesake
-from tests.apps.planning.test_plan_puzzles import PEG
+from tests.apps.planning.test_plan_models import PEG
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
 from tests.paths import PAPER, ROOT

@@ -19,7 +19,7 @@ from factory.floor.layout.coordinating import with_machines
 from factory.pipeline import Project, all_templates
 from factory.theory.lang import read_pag
 from factory.theory.nets.verify import verify
-from tests.apps.arms.test_own_arm import BOX, own
+from tests.apps.arms.test_read import BOX, own
 from tests.arm_cells import SMALL, cell, refusal
 from tests.command_line import Terminal, spawn
 

@@ -21,7 +21,7 @@ from factory.apps.planning.exploded import ExplodedView
 from factory.apps.planning.exploding import explosion
 from factory.apps.planning.interlocked import PAINTS
 from factory.pipeline import read
-from tests.apps.planning.test_plan_puzzles import CHAIN, LOADED, PEG
+from tests.apps.planning.test_plan_models import CHAIN, LOADED, PEG
 from tests.command_line import Done, Terminal
 from tests.opengl import needs_gl
 from tests.paths import ROOT, files_in

@@ -14,6 +14,7 @@ from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import recover
 from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
 from factory.apps.recovery.standing import MotionHold
+from factory.commands.summaries import say_failures
 from factory.engine.record.failures import Failures
 from factory.engine.simulation.compiled import compiled
 from factory.engine.simulation.request import RunRequest
@@ -245,3 +246,22 @@ def test_all_that_is_wrong_is_said_at_once_and_where(run: Terminal, tmp_path: Pa
     assert done.codes == ["UnknownParameter", "BadFault"]
     assert [error["line"] for error in done.json["errors"]] == [1, 3]
     assert "drop" in done.json["errors"][1]["hint"]
+
+
+SLIPS = tuple(Deviation("bad_joint", label="sub1", unit=2, metres=2e-3) for _ in range(3))
+"""Done again twice, then the inputs are scrapped."""
+
+
+def test_scrap_falls_into_its_bin() -> None:
+    run, failures = run_with(*SLIPS, jitter=0.3)
+    assert_recovered(run, failures, {"bad_joint": 3})
+    assert failures.found[-1].scrapped == ("part1", "part2")
+    assert (failures.binned, failures.spilled) == (2, ())
+
+
+@pytest.mark.parametrize(("spilled", "words"), [((), "scrap in bins: 3\n")])
+def test_bins_are_told_in_words(
+    capsys: pytest.CaptureFixture[str], spilled: tuple[str, ...], words: str
+) -> None:
+    say_failures(replace(Failures(), binned=3, spilled=spilled), False)
+    assert words in "".join(capsys.readouterr())
