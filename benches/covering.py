@@ -162,7 +162,8 @@ def choose() -> None:
     brief = {name for name, (_, started) in spent.items() if started and cost[name] <= BRIEF}
     examples = {name for name in cost if not name.startswith("tests/")}
     kept |= brief | examples | (cost.keys() - taken.keys())
-    kept |= cost.keys() & {*KEPT, *killers()}
+    wanted = {*KEPT, *killers()}
+    kept |= {name for name in cost if name in wanted or name.split("[")[0] in wanted}
     out = cost.keys() - kept
     print(*listed(out, kept), sep="\n")
     seconds = sum(cost[name] for name in kept)

@@ -133,7 +133,7 @@ def example(code: str, folder: Path) -> list[str]:
 
 
 DEAR = ("Unreachable",)
-"""Codes whose examples take long; `test_swing.py` has a quicker one."""
+"""Codes whose examples take long; `test_sides.py` has a quicker one."""
 
 
 @pytest.mark.parametrize(
