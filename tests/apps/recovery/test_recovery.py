@@ -11,23 +11,25 @@ from typing import Any
 import pytest
 
 from factory.apps.deviations import Campaign, Deviation
-from factory.apps.recovery import recover
+from factory.apps.recovery import Recovery, recover
 from factory.apps.recovery.mujoco.plant import MujocoPlant, Senses
 from factory.apps.recovery.standing import MotionHold
 from factory.commands.summaries import say_failures
 from factory.engine.record.failures import Failures
+from factory.engine.record.state import State
 from factory.engine.simulation.compiled import compiled
-from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
+from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.theory.nets.undone import Undone
 from factory.theory.problem.template import Failure
 from tests.command_line import Terminal
 from tests.examples import with_hands
 from tests.good_runs import assert_good
-from tests.paths import PAPER
+from tests.paths import PAPER, ROOT
 from tests.simulation_values import layout_of
 
 WORLDS = "mujoco", "ideal"
@@ -265,3 +267,100 @@ def test_bins_are_told_in_words(
 ) -> None:
     say_failures(replace(Failures(), binned=3, spilled=spilled), False)
     assert words in "".join(capsys.readouterr())
+
+
+STEPS = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.16, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.03, 0.03, 0.02 ), pos = ( -0.04, 0, 0.03 ) );
+b = atomic ( box = ( 0.03, 0.03, 0.03 ), pos = ( 0.04, 0, 0.035 ) )"""
+"""Two robots with lifts put parts of two heights onto a base."""
+
+
+@pytest.fixture
+def steps(tmp_path: Path) -> Layout:
+    """Their layout."""
+    (tmp_path / "steps.pag").write_text(STEPS)
+    return read(tmp_path / "steps.pag").layout
+
+
+def laid_out(folder: Path, template: str, failure: str) -> Layout:
+    """The paper's example with another `failure` in one of its templates."""
+    text = (ROOT / "templates" / f"{template}.op").read_text("utf-8")
+    begin = text.index("failure = ")
+    text = text[:begin] + f"failure = {{ {failure} }};" + text[text.index(";", begin) + 1 :]
+    (folder / f"{template}.op").write_text(text, "utf-8")
+    return read(PAPER, [folder]).layout
+
+
+def stopped(
+    layout: Layout,
+    world: WorldName,
+    *faults: Deviation,
+    spares: int = 0,
+    late: int = 8,
+    label: str = "sub1",
+) -> tuple[Run, Recovery]:
+    """A run in which faults strike robots in the second operation of a `label`, so many ticks
+    `late`: when they are on their way."""
+    simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
+    recovery = recover(simulation, Campaign(clear=1.0, spares=spares, swap=2.0))
+    number, struck = layout.factory.by_label[label], list[float]()
+
+    def strike(state: State) -> None:
+        supervisor = simulation.supervisor
+        if supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations:
+            struck.append(state.time)
+            if len(struck) == late:
+                for fault in faults:
+                    recovery.strike(fault)
+
+    return simulation.run([strike], 200.0), recovery
+
+
+STANDS = Deviation("down", robot="r5", at=0.0, seconds=12.0)
+"""For longer than a robot that is not dead may be late."""
+
+
+def test_a_robot_whose_lift_still_waits_has_left(steps: Layout) -> None:
+    """One of its axes on its way is enough: it is stuck, and not dead."""
+    run, recovery = stopped(steps, "ideal", replace(STANDS, robot="r2"), label="s2")
+    assert (run.products, run.trouble) == (4, None)
+    assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize(
+    ("responses", "units", "made"),
+    [
+        ("scrap", (2, 2, 3), 4),
+        ("stop", (2,), 1),
+        ("again 1 then stop", (2, 3), 4),
+        ("again 1 then stop", (2, 2), 1),
+    ],
+)
+def test_what_lies_askew_stops_the_run_where_the_template_says_so(
+    tmp_path: Path, world: WorldName, responses: str, units: tuple[int, ...], made: int
+) -> None:
+    """Failures on end count, and what is good ends them."""
+    layout = laid_out(tmp_path, "atomic", f"misplaced > 2e-3 : {responses}, lost : scrap")
+    faults = tuple(Deviation("misplaced", label="part1", unit=unit) for unit in units)
+    simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
+    recovery = recover(simulation, Campaign(faults, clear=1.0))
+    run = simulation.run(max_time=200.0)
+    if made == 4:
+        assert (run.products, run.trouble) == (4, None)
+        assert [one.test for one in recovery.found] == ["misplaced"] * len(units)
+    else:
+        assert run.products <= made and run.trouble is not None
+        assert run.trouble.message == "'part1' fails the test 'misplaced'"
+        *before, last = recovery.found
+        assert (last.response, last.done) == ("stop", "the run ends")
+        assert [one.response for one in before] == ["scrap"] * (len(units) - 1)
+        report = recovery.report()
+        assert (report.missed, report.false_alarms) == (0, 0)
+
+
+@pytest.mark.parametrize("name", ["mate", "insert", "weld", "press", "glue"])
+def test_shipped_templates_that_join_test_for_what_is_stuck(name: str) -> None:
+    text = (ROOT / "templates" / f"{name}.op").read_text("utf-8")
+    assert "jammed : again 2 then scrap" in text

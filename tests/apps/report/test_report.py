@@ -4,8 +4,11 @@ which nothing of the user's is taken for anything but text."""
 from __future__ import annotations
 
 import base64
+import csv
 import hashlib
+import io
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,18 +17,24 @@ import numpy as np
 import pytest
 
 import factory
+from factory.apps.exports import Subject, exporters
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.log import LogWriter, read_log
+from factory.apps.log.failed import failures_of
 from factory.apps.report import page, recording_of
 from factory.apps.report.drawings import data
+from factory.apps.report.failures import failures_data, failures_section
 from factory.apps.report.pace import fidelity
 from factory.apps.report.page import SCRIPTS
+from factory.apps.report.recording import Recording
 from factory.apps.report.scene import PLAIN
 from factory.apps.report.words import proof
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from factory.support.tables import table_of
 from tests.command_line import Terminal
+from tests.failing_runs import failing, paper_layout
 from tests.paths import PAPER, files_in
 from tests.report_values import EVIL, Page, altered
 
@@ -210,3 +219,57 @@ def test_corners_have_the_finish_of_their_material(made: Page, recording) -> Non
     assert {tuple(row) for rows in finishes for row in rows.tolist()} <= known
     assert len({tuple(row) for rows in finishes for row in rows.tolist()}) > 4
     assert all(len(made.array(f"v{n}")) == 3 * len(finishes[n]) for n in shapes)
+
+
+@pytest.fixture(scope="module")
+def failed(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    path = tmp_path_factory.mktemp("failing") / "log"
+    failing(path)
+    return recording_of(path, paper_layout())
+
+
+def test_the_section_tells_every_failure(failed: Recording) -> None:
+    section, failures = failures_section(failed), failed.log.failures
+    assert failures is not None and len(failures.found) >= 4
+    assert section.count(" s</th><td>") == len(failures.found)
+    for one in failures.found:
+        assert f"<tr><th>{one.t:.2f} s</th><td>{one.what}</td><td>{one.done}</td>" in section
+    lost = next(u for _, u in failed.log.undone if u.reason == "lost")
+    assert ", ".join(lost.transitions) in section
+    assert f"{failures.contacts} contact" in section and "1 spare used" in section
+
+
+def test_the_page_can_draw_what_was_undone(failed: Recording) -> None:
+    data, count = failures_data(failed), len(failed.log.fired)
+    names = failed.log.header["transitions"]
+    assert len(data["undone"]) == len(failed.log.undone) >= 3
+    for (after, t, events), (_, undone) in zip(data["undone"], failed.log.undone, strict=True):
+        assert 0 <= after <= count and t == pytest.approx(undone.t, abs=1e-4)
+        assert [names[event] for event in events] == [*undone.transitions]
+    assert any(robots for _, robots in data["stood"])
+    text = page(failed)
+    assert "Failures</h2>" in text and "spansWithUndone" in text and ".op.undone" in text
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("missed", -1, "counts must be whole numbers from 0"),
+        ("stood", [[1.0, ["r9"]]], "'r9' stood"),
+        ("found", [{"t": -1}], "lacks the key 'test'"),
+    ],
+)
+def test_what_is_no_account_of_failures_is_refused(
+    failed: Recording, key: str, value: object, words: str
+) -> None:
+    assert failed.log.failures is not None
+    told = {**table_of(failed.log.failures), key: value}
+    with pytest.raises(ValueError, match=words):
+        failures_of(told, frozenset(failed.log.header["robots"]))
+
+
+def test_csv_says_so(failed: Recording) -> None:
+    text = exporters()["csv"].export(Subject(Path("log"), failed.log))
+    assert isinstance(text, str)
+    kinds = Counter(row["kind"] for row in csv.DictReader(io.StringIO(text)))
+    assert kinds.keys() == {"start", "end", "start undone", "end undone"}
