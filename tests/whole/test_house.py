@@ -10,48 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.house import (
-    House,
-    anys,
-    circles,
-    clocks,
-    engine_imports,
-    engine_writes,
-    long_modules,
-    misplaced_tests,
-    reach_ins,
-    strangers,
-    this_house,
-    twins,
-    unexplained,
-    unguided,
-    upward_imports,
-    vague,
-    variants,
-)
-from tests.interface import interface, undocumented
-from tests.naming import named_apps
+from tests import house as laws
+from tests.house import House, anys, this_house
 from tests.paths import ROOT
 
 Law = Callable[[House], Iterator[str]]
 LAWS: tuple[Law, ...] = (
-    strangers,
-    upward_imports,
-    circles,
-    engine_imports,
-    engine_writes,
-    twins,
-    long_modules,
-    unexplained,
-    unguided,
-    clocks,
-    misplaced_tests,
-    variants,
-    vague,
-    reach_ins,
-    interface,
-    undocumented,
-    named_apps,
+    *(laws.strangers, laws.upward_imports, laws.circles, laws.engine_imports),
+    *(laws.engine_writes, laws.twins, laws.long_modules, laws.unexplained),
+    *(laws.unguided, laws.clocks, laws.misplaced_tests, laws.variants),
+    *(laws.vague, laws.reach_ins, laws.interface, laws.undocumented),
+    *(laws.named_apps,),
 )
 BREACHES = r'''
 strangers: loose: on no floor
@@ -173,10 +142,14 @@ def breaches() -> Iterator[tuple[Law, dict[str, str], str]]:
             file: text.strip().replace("\n    ", "\n").replace("\\n", "\n")
             for file, _, text in pairs
         }
-        yield globals()[name], files, said
-    yield long_modules, {"factory/theory/nets/a.py": "x = 1\n" * 351}, "theory.nets.a: 351 lines"
+        yield getattr(laws, name), files, said
+    yield (
+        laws.long_modules,
+        {"factory/theory/nets/a.py": "x = 1\n" * 351},
+        "theory.nets.a: 351 lines",
+    )
     names = " ".join(map("n{}".format, range(101)))
-    yield interface, {"factory/api.py": f"HOMES = {{'pipeline': '{names}'}}"}, "api: 101 names"
+    yield laws.interface, {"factory/api.py": f"HOMES = {{'pipeline': '{names}'}}"}, "api: 101 names"
 
 
 @pytest.fixture(scope="module")

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
+from manifold3d import Manifold
 
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
@@ -13,7 +17,256 @@ from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.titles import Titles
 from factory.apps.planning.writing import Screwed, Tree, leaves
 from factory.pipeline import all_templates
-from tests.engineered_products import MADE, Engineered, box, rod, write_stl
+
+Parts = Mapping[str, Manifold]
+
+FIT = 0.15
+"""Room between parts that slide in each other [mm]."""
+
+
+@dataclass(frozen=True)
+class Engineered:
+    """Parts in place, and what an engineer knows of them: the `base`, or any of several; the pairs
+    of parts of which the first is there `before` the second comes; a name that ends in `*` means
+    all that begin so."""
+
+    parts: Parts
+    base: frozenset[str]
+    before: tuple[tuple[str, str], ...]
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs of parts, written out."""
+        return [
+            (one, other)
+            for first, then in self.before
+            for one in self._named(first)
+            for other in self._named(then)
+        ]
+
+    def _named(self, name: str) -> list[str]:
+        if not name.endswith("*"):
+            return [name]
+        return [label for label in self.parts if label.startswith(name[:-1])]
+
+
+def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
+    """A box that stands on a point."""
+    return Manifold.cube((x, y, z), True).translate((at[0], at[1], at[2] + z / 2))
+
+
+def rod(
+    radius: float, low: float, high: float, at: tuple[float, float] = (0, 0), sides: int = 24
+) -> Manifold:
+    """An upright round bar."""
+    return Manifold.cylinder(high - low, radius, radius, sides).translate((*at, low))
+
+
+def tube(
+    outer: float, inner: float, low: float, high: float, at: tuple[float, float] = (0, 0)
+) -> Manifold:
+    """An upright round bar with a hole."""
+    return rod(outer, low, high, at) - rod(inner, low - 1, high + 1, at)
+
+
+def along_x(body: Manifold) -> Manifold:
+    """A body that was drawn upright, with its upper end at +x."""
+    return body.rotate((0, 90, 0))
+
+
+def along_y(body: Manifold) -> Manifold:
+    """A body that was drawn upright, with its upper end at -y."""
+    return body.rotate((90, 0, 0))
+
+
+def screw(at: tuple[float, float], under: float, long: float, radius: float = 1.5) -> Manifold:
+    """A screw whose head stands at a height."""
+    head = rod(1.9 * radius, under, under + 2 * radius, at)
+    return rod(radius, under - long, under, at) + head
+
+
+def nut(at: tuple[float, float], low: float, radius: float = 1.5) -> Manifold:
+    """A nut on a height."""
+    return rod(2.1 * radius, low, low + 1.6 * radius, at, 6) - rod(radius, low - 1, low + 9, at)
+
+
+def corners(x: float, y: float) -> list[tuple[float, float]]:
+    """The four corners of a rectangle."""
+    return [(a, b) for a in (-x, x) for b in (-y, y)]
+
+
+def drilled(body: Manifold, at: list[tuple[float, float]], radius: float) -> Manifold:
+    """A body with upright holes."""
+    for place in at:
+        body = body - rod(radius, -200, 200, place)
+    return body
+
+
+def numbered(
+    name: str, make: Callable[[tuple[float, float]], Manifold], at: list[tuple[float, float]]
+) -> Parts:
+    """Copies of a part."""
+    return {f"{name}{n}": make(place) for n, place in enumerate(at, 1)}
+
+
+def instrument() -> Engineered:
+    """A battery, a board and a display in a case with a screwed lid, and a knob through it."""
+    at = corners(26, 16)
+    case = box(60, 42, 24) - box(54, 36, 24, (0, 0, 3))
+    for place in at:
+        case = case + rod(4, 3, 24, place) - rod(1.5, 8, 40, place)
+    lid = drilled(box(60, 42, 3, (0, 0, 24)), at, 1.7) - rod(5.2, 20, 40)
+    parts = {
+        "case": case,
+        "battery": box(30, 22, 6, (0, 0, 3)),
+        "board": box(38, 26, 2, (0, 0, 9)),
+        "display": box(14, 14, 8, (0, 0, 11)),
+        "lid": lid,
+        "knob": rod(5, 19.0, 27) + rod(8, 27, 33),
+        **numbered("screw", lambda p: screw(p, 27, 14), at),
+    }
+    order = (("battery", "board"), ("board", "display"), ("display", "lid"), ("lid", "screw*"))
+    return Engineered(parts, frozenset({"case"}), (*order, ("lid", "knob")))
+
+
+def flange() -> Engineered:
+    """Two plates and a gasket, bolted through, with nuts below."""
+    at = corners(18, 18)
+    plates = [drilled(box(50, 50, h, (0, 0, z)), at, 2.1) for h, z in ((8, 0), (1, 8), (6, 9))]
+    parts = dict(zip(("foot", "gasket", "cover"), plates, strict=True))
+    parts["foot"] = parts["foot"] + box(26, 26, 20, (0, 0, -20))
+    parts |= numbered("bolt", lambda p: screw(p, 15, 21, 2), at)
+    parts |= numbered("nut", lambda p: nut(p, -3.2, 2), at)
+    order = (("foot", "gasket"), ("gasket", "cover"), ("cover", "bolt*"))
+    nuts = tuple((f"bolt{n}", f"nut{n}") for n in range(1, 5))
+    return Engineered(parts, frozenset({"foot"}), (*order, *nuts))
+
+
+def keyed_shaft() -> Engineered:
+    """A shaft with a foot, a key in it, a gear over the key, a collar and a nut on top."""
+    slot = box(4, 4, 20, (8, 0, 12))
+    shaft = rod(20, 0, 8) + rod(8, 8, 46) + rod(5, 46, 60) - slot
+    key = box(6 - 2 * FIT, 4 - 2 * FIT, 20 - 2 * FIT, (9, 0, 12 + FIT))
+    gear = tube(24, 8 + FIT, 8, 34) - box(6, 4, 40, (10.5, 0, 0))
+    parts = {
+        "shaft": shaft,
+        "key": key,
+        "gear": gear,
+        "collar": tube(14, 8 + FIT, 34, 42),
+        "nut": nut((0, 0), 46, 5),
+    }
+    order = (("key", "gear"), ("gear", "collar"), ("collar", "nut"))
+    return Engineered(parts, frozenset({"shaft"}), order)
+
+
+def hinge() -> Engineered:
+    """Two leaves and a pin through their knuckles."""
+
+    def knuckle(low: float, high: float) -> Manifold:
+        return along_x(tube(5, 2.5 + FIT, low, high))
+
+    left = box(60, 30, 4, (0, -18, -5)) + knuckle(-30, -10.2) + knuckle(10.2, 30)
+    right = box(60, 30, 4, (0, 18, -5)) + knuckle(-10, 10)
+    left = left - box(20.4, 12, 12, (0, 0, -6)) - along_x(rod(2.5 + FIT, -40, 40))
+    right = right - box(20, 11, 12, (-20.2, 0, -6)) - box(20, 11, 12, (20.2, 0, -6))
+    right = right - along_x(rod(2.5 + FIT, -40, 40))
+    pin = along_x(rod(2.5, -30, 31) + rod(4.5, 31, 34))
+    order = (("left", "pin"), ("right", "pin"))
+    return Engineered(
+        {"left": left, "right": right, "pin": pin}, frozenset({"left", "right"}), order
+    )
+
+
+def piston() -> Engineered:
+    """A rod in a piston, held by its pin; both in a cylinder with a screwed head."""
+    at = corners(19, 19)
+    block = drilled(box(50, 50, 70), at, 0.1) - rod(15 + FIT, 6, 90) - box(14, 14, 90)
+    for place in at:
+        block = block - rod(1.5, 50, 80, place)
+    across = along_x(rod(3 + FIT, -40, 40)).translate((0, 0, 50))
+    piston_ = rod(15, 40, 62) - box(8, 12, 18, (0, 0, 39)) - across
+    conrod = box(8 - 2 * FIT, 8, 50, (0, 0, 5)) - across
+    pin = along_x(rod(3, -12, 12)).translate((0, 0, 50))
+    head = drilled(box(50, 50, 8, (0, 0, 70)), at, 1.7)
+    parts = {"block": block, "piston": piston_, "conrod": conrod, "pin": pin, "head": head}
+    parts |= numbered("screw", lambda p: screw(p, 78, 22), at)
+    order = (("piston", "pin"), ("conrod", "pin"), ("pin", "head"), ("head", "screw*"))
+    return Engineered(parts, frozenset({"block"}), order)
+
+
+def cabinet() -> Engineered:
+    """Two drawers, with knobs, in a body that is open in front, and a top on four dowels."""
+    body = box(60, 50, 62) - box(54, 50, 26, (0, -3, 4)) - box(54, 50, 26, (0, -3, 33))
+    at = corners(26, 20)
+    for place in at:
+        body = body - rod(2, 59.5, 70, place)
+    parts = {"body": drilled(body, [], 1)}
+    for n, z in enumerate((4, 33), 1):
+        drawer = box(54 - 2 * FIT, 46, 22, (0, -2, z)) - box(48, 40, 22, (0, -2, z + 3))
+        parts[f"drawer{n}"] = drawer - along_y(rod(2 + FIT, 15, 40)).translate((0, 0, z + 11))
+        grip = along_y(rod(2, 19, 25) + rod(5, 25, 31)).translate((0, 0, z + 11))
+        parts[f"knob{n}"] = grip
+    parts |= numbered("dowel", lambda p: rod(2, 59.5, 66, p), at)
+    top = box(66, 56, 8, (0, 0, 62))
+    for place in at:
+        top = top - rod(2 + FIT, 60, 66.2, place)
+    parts["top"] = top
+    order = (("dowel*", "top"), ("drawer1", "knob1"), ("drawer2", "knob2"))
+    return Engineered(parts, frozenset({"body"}), order)
+
+
+def valve() -> Engineered:
+    """A seat, a ball and a stem with a bonnet, and a handle with its nut."""
+    body = box(40, 40, 40) - rod(12, 6, 50) - along_x(rod(6, -30, 30)).translate((0, 0, 16))
+    parts = {
+        "body": body,
+        "seat": tube(12 - FIT, 5, 6, 9),
+        "ball": Manifold.sphere(8, 48).translate((0, 0, 9 + 6.35)),
+        "bonnet": tube(17, 3 + FIT, 40, 46) + tube(12 - FIT, 3 + FIT, 30, 40),
+        "stem": rod(3, 24, 66) + rod(6, 24, 29.8),
+        "handle": box(60, 12, 5, (18, 0, 50)) - rod(3 + FIT, 40, 60),
+        "nut": nut((0, 0), 55, 3),
+    }
+    order = (("seat", "ball"), ("ball", "bonnet"), ("bonnet", "handle"), ("handle", "nut"))
+    return Engineered(parts, frozenset({"body"}), order)
+
+
+def clamp() -> Engineered:
+    """A strap over a pipe on a saddle, with two bolts, washers under their heads, and nuts."""
+    at = [(-24.0, 0.0), (24.0, 0.0)]
+    pipe = along_y(tube(14, 11, -40, 40)).translate((0, 0, 24))
+    room = along_y(rod(14 + FIT, -60, 60)).translate((0, 0, 24))
+    saddle = drilled(box(64, 30, 23, (0, 0, 0)), at, 2.1) - room
+    strap = drilled(box(64, 24, 16, (0, 0, 25)), at, 2.1) - room
+    parts = {"saddle": saddle, "pipe": pipe, "strap": strap}
+    parts |= numbered("washer", lambda p: tube(5, 2 + FIT, 41, 42, p), at)
+    parts |= numbered("bolt", lambda p: screw(p, 42, 48, 2), at)
+    parts |= numbered("nut", lambda p: nut(p, -3.2, 2), at)
+    order = (("pipe", "strap"), ("strap", "bolt*"), ("washer1", "bolt1"), ("washer2", "bolt2"))
+    return Engineered(parts, frozenset({"saddle"}), (*order, ("bolt1", "nut1"), ("bolt2", "nut2")))
+
+
+MADE: tuple[Callable[[], Engineered], ...] = (
+    instrument,
+    flange,
+    keyed_shaft,
+    hinge,
+    piston,
+    cabinet,
+    valve,
+    clamp,
+)
+
+
+def write_stl(parts: Parts, folder: Path) -> Path:
+    """The parts as STL files in millimetres, each where it is in the product."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for label, body in parts.items():
+        mesh = body.to_mesh()
+        points = np.asarray(mesh.vert_properties)[:, :3]
+        made = trimesh.Trimesh(points, np.asarray(mesh.tri_verts), process=False)
+        made.export(folder / f"{label}.stl")
+    return folder
+
 
 TEMPLATES = all_templates()
 
