@@ -193,12 +193,7 @@ ENTRANCES = (
 the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
-    "support",
-    "engine/mjcf",
-    "engine/record",
-    "engine/simulation/mujoco",
-    "film",
-    "api",
+    *("support", "engine/mjcf", "engine/record", "engine/simulation/mujoco", "film", "api"),
     "apps",
 )
 """Rooms, or parts of rooms, that may import the engine."""
@@ -207,13 +202,8 @@ VAGUE = frozenset({"found", "told", "given", "known", "own"})
 """Names that do not say what a variable is."""
 
 ENGINE_WRITERS = (
-    "engine/simulation/mujoco",
-    "engine/mjcf",
-    "apps/deviations",
-    "apps/recovery",
-    "apps/fidelity/solid",
-    "apps/arms/scene",
-    "apps/arms/sharing",
+    *("engine/simulation/mujoco", "engine/mjcf", "apps/deviations", "apps/recovery"),
+    *("apps/fidelity/solid", "apps/arms/scene", "apps/arms/sharing"),
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""

@@ -94,20 +94,8 @@ def test_read_after_write_is_the_identity(template: Template) -> None:
 
 
 def test_what_is_shipped() -> None:
-    assert list(TEMPLATES) == [
-        "atomic",
-        "dropoff",
-        "glue",
-        "insert",
-        "inspect",
-        "mate",
-        "pick",
-        "place",
-        "press",
-        "relay",
-        "screw",
-        "weld",
-    ]
+    names = "atomic dropoff glue insert inspect mate pick place press relay screw weld"
+    assert " ".join(TEMPLATES) == names
     assert TEMPLATES["dropoff"].result == "nopart"
     assert TEMPLATES["mate"].further == TEMPLATES["mate"].instead == "insert"
     assert (TEMPLATES["place"].further, TEMPLATES["place"].brought) == ("place", "pick")

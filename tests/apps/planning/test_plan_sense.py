@@ -245,16 +245,7 @@ def clamp() -> Engineered:
     return Engineered(parts, frozenset({"saddle"}), (*order, ("bolt1", "nut1"), ("bolt2", "nut2")))
 
 
-MADE: tuple[Callable[[], Engineered], ...] = (
-    instrument,
-    flange,
-    keyed_shaft,
-    hinge,
-    piston,
-    cabinet,
-    valve,
-    clamp,
-)
+MADE = (instrument, flange, keyed_shaft, hinge, piston, cabinet, valve, clamp)
 
 
 def write_stl(parts: Parts, folder: Path) -> Path:
