@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-import pytest
+import random
+from dataclasses import replace
+from itertools import combinations
 
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from factory.theory.nets import exclusion
+from factory.theory.nets.exclusion import ORDER, excluding, ordered
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.nets.threaded import ThreadedNet, Threads
 from factory.theory.plant.factory import Factory
+from tests.net_values import net_from
 from tests.pag_values import factory_of, paper
+from tests.state_space import explored
 from tests.token_game import enabled, follower
 
 _T = (Transition("a"), Transition("b"))
@@ -51,3 +62,122 @@ def test_a_robot_that_is_not_where_its_token_is_does_not_fire() -> None:
     threads.marked[:] = bytes([1, 0])
     with pytest.raises(AssertionError, match="not legal"):
         threads.fire((1,))
+
+
+MARKINGS = 3_000
+"""Nets with more markings are not explored."""
+
+
+def geared(rng: random.Random) -> tuple[MarkedNet, list[int]]:
+    """A live marked graph of gears that share transitions, each with one token, some of them as
+    they are after some firings, and a sequence that fires each transition once."""
+    events = rng.randint(2, 7)
+    order = [*range(events)]
+    rng.shuffle(order)
+    gears = [sorted(rng.sample(range(events), rng.randint(2, events))) for _ in range(4)]
+    for lonely in {*range(events)} - {at for gear in gears for at in gear}:
+        gears.append(sorted({lonely, rng.choice([at for at in range(events) if at != lonely])}))
+    edges = [
+        (order[a], order[b], int(a > b))
+        for gear in gears
+        for a, b in zip(gear, gear[1:] + gear[:1], strict=True)
+    ]
+    places = tuple(Place(f"p{n}", (a,), (b,)) for n, (a, b, _) in enumerate(edges))
+    net = PetriNet(tuple(Transition(f"t{n}") for n in range(events)), places)
+    return MarkedNet(net, tuple(tokens for _, _, tokens in edges)), order
+
+
+def together(net: MarkedNet) -> set[tuple[int, int]] | None:
+    """The pairs of places that some reachable marking marks both; None where there are too many
+    markings."""
+    truth = explored(net, MARKINGS)
+    if truth is None:
+        return None
+    at_once = {tuple(p for p, tokens in enumerate(m) if tokens) for m in truth.markings}
+    return {pair for marking in at_once for pair in combinations(marking, 2)}
+
+
+def check_circuit(net: MarkedNet, circuit: tuple[int, ...], pair: tuple[int, int]) -> None:
+    """It is a circuit of the net, goes through both places and has one token."""
+    assert {*pair} <= {*circuit}
+    for before, after in zip(circuit, circuit[1:] + circuit[:1], strict=True):
+        assert net.right[before] == net.left[after]
+    assert sum(net.tokens[place] for place in circuit) == 1
+
+
+@given(st.randoms(use_true_random=False))
+@settings(max_examples=150)
+def test_excluded_where_never_marked_together(rng: random.Random) -> None:
+    net, _ = geared(rng)
+    pairs = [*combinations(range(len(net.net.places)), 2)]
+    marked = together(net)
+    if marked is None:
+        return
+    circuits = excluding(net, pairs)
+    for pair, circuit in zip(pairs, circuits, strict=True):
+        assert (circuit is None) == (pair in marked)
+        if circuit is not None:
+            check_circuit(net, circuit, pair)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(exclusion, "BLOCK", 2)
+        assert excluding(net, pairs) == circuits
+
+
+@given(st.randoms(use_true_random=False))
+@settings(max_examples=150)
+def test_ordered_places_are_never_marked_together(rng: random.Random) -> None:
+    """And the net stays live, safe and reversible; what is left over the sequence marks itself; no
+    order place could be left out."""
+    net, sequence = geared(rng)
+    every = [*combinations(range(len(net.net.places)), 2)]
+    pairs = rng.choices(every, k=rng.randint(1, len(every)))
+    result = ordered(net, sequence, pairs, earlier(net, sequence, rng))
+    assert {*result.places} == {*pairs} - marked_by(net, sequence)
+    for circuit, pair in zip(excluding(result.net, result.places), result.places, strict=True):
+        assert circuit is not None
+        check_circuit(result.net, circuit, pair)
+    truth = explored(result.net, MARKINGS)
+    if truth is not None:
+        assert truth.behaviour == (True, True, True)
+        assert not {*result.places} & (together(result.net) or set())
+    for place in range(len(net.net.places), len(result.net.net.places)):
+        assert result.net.net.places[place].mode == ORDER
+        fewer = without(result.net, place)
+        assert None in excluding(fewer, result.places)
+
+
+def earlier(net: MarkedNet, sequence: list[int], rng: random.Random) -> dict[int, int]:
+    """For some transitions one before each, with a place without token in between."""
+    empty = [p for p, tokens in enumerate(net.tokens) if not tokens]
+    before = {net.right[p]: net.left[p] for p in empty}
+    return {event: before[event] for event in sequence if event in before and rng.random() < 0.5}
+
+
+def marked_by(net: MarkedNet, sequence: list[int]) -> set[tuple[int, int]]:
+    """The pairs that a firing sequence marks both."""
+    tokens, pairs = list(net.tokens), set[tuple[int, int]]()
+    for event in sequence:
+        pairs.update(combinations((p for p, count in enumerate(tokens) if count), 2))
+        for place in net.net.preset[event]:
+            tokens[place] -= 1
+        for place in net.net.postset[event]:
+            tokens[place] += 1
+    assert tuple(tokens) == net.tokens
+    return pairs
+
+
+def without(net: MarkedNet, place: int) -> MarkedNet:
+    """The net without a place, which has no token from now on and nothing to do with any other."""
+    places = list(net.net.places)
+    places[place] = replace(places[place], left=(), right=())
+    return MarkedNet(replace(net.net, places=tuple(places)), net.tokens)
+
+
+def test_what_can_not_be_asked_is_refused() -> None:
+    net = net_from([("a", "b", 1), ("b", "a", 0), ("b", "a", 0)])
+    assert excluding(net, [(0, 1), (1, 2)]) == [(0, 1), None]
+    assert not ordered(net, [1, 0], [(1, 2)]).places
+    with pytest.raises(ValueError, match="sequence"):
+        ordered(net, [0, 1], [])
+    with pytest.raises(ValueError, match="marked graph"):
+        excluding(net_from([("a c", "b", 1), ("b", "a", 0), ("b", "c", 0)]), [(0, 1)])
