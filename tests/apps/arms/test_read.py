@@ -39,6 +39,11 @@ def arm(
 
 
 BAD = {
+    "has no site 'tool'": arm(site='<site name="tip"/>'),
+    "is not one chain: joint 'finger' is not between base and tool": arm(
+        beside=LINK.format('<joint name="finger" range="0 9"/>') + "</body>"
+    ),
+    "says no speed of its joints": arm(head=""),
     "is a ball joint": arm(second='<joint name="wrist" type="ball" range="0 90"/>'),
     "has no joints": arm(first="", second=""),
     "joint 'wrist' has no limits": arm(second='<joint name="wrist" axis="0 1 0"/>'),
