@@ -5,8 +5,8 @@ the package each test takes, and how long it takes, in build/covering/. `python 
 choose` picks tests, those first that take most new branches for their time, as long as that is
 WORTH it. It keeps with them what no coverage sees (tests of documents and of the house, of
 processes that they start), examples in docstrings, and what first kills a mutant
-(`benches/mutants.toml`), and writes all others to tests/covered.txt: `make test` leaves these out,
-`make test-all` runs them. A test that has not been measured is new, and runs."""
+(`benches/mutants.toml`), and prints all others: they bring nothing, and can go, but for those that
+alone hold a law, a theorem or a code."""
 
 from __future__ import annotations
 
@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from benches.mutants import LIST, ROOT
 
 FOLDER = ROOT / "build" / "covering"
-COVERED = ROOT / "tests" / "covered.txt"
 
 OFTEN = 40
 """What has been seen is written after so many tests."""
@@ -156,22 +155,24 @@ def listed(names: Collection[str], kept: Collection[str]) -> list[str]:
 
 
 def choose() -> None:
-    """Write the list of what `make test` leaves out."""
+    """Print the tests that bring nothing."""
     spent, taken = times(), branches()
     cost = {name: LEAST + own + started for name, (own, started) in spent.items()}
     kept = chosen({name: bits for name, bits in taken.items() if name in cost}, cost)
     brief = {name for name, (_, started) in spent.items() if started and cost[name] <= BRIEF}
     examples = {name for name in cost if not name.startswith("tests/")}
     kept |= brief | examples | (cost.keys() - taken.keys())
-    kept |= cost.keys() & {*KEPT, *killers()}
+    wanted = {*KEPT, *killers()}
+    kept |= {name for name in cost if name in wanted or name.split("[")[0] in wanted}
     out = cost.keys() - kept
-    COVERED.write_text("".join(f"{name}\n" for name in listed(out, kept)), encoding="utf-8")
+    print(*listed(out, kept), sep="\n")
     seconds = sum(cost[name] for name in kept)
     every = np.bitwise_count(np.bitwise_or.reduce([*taken.values()])).sum()
     theirs = np.bitwise_count(np.bitwise_or.reduce([taken[n] for n in kept & taken.keys()])).sum()
     print(
         f"{len(kept)} of {len(cost)} tests, {seconds:.0f} of {sum(cost.values()):.0f} s,"
-        f" {theirs} of {every} branches"
+        f" {theirs} of {every} branches",
+        file=sys.stderr,
     )
 
 

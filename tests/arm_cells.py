@@ -7,10 +7,6 @@ from functools import cache
 from factory.api import Diagnostic, InputError, RunError
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.ground import with_arm
-from factory.apps.runs.watched import watched
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import Run
-from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates
 from factory.theory.lang import read_pag
@@ -40,11 +36,6 @@ def chains(layout: Layout) -> CellChains:
     """What a cell says of its arms."""
     assert isinstance(layout.chains, CellChains)
     return layout.chains
-
-
-def run(layout: Layout, **request: object) -> Run:
-    """A watched run of a cell."""
-    return watched(Simulation(layout, RunRequest(shown=False, **request)))  # type: ignore[arg-type]
 
 
 def refusal(text: str, arm: str = "six") -> Diagnostic:

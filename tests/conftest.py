@@ -45,15 +45,6 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: Sequence[pytest.Item]) -> None:
-    """Mark what tests/covered.txt names: cases, or whole functions."""
-    covered = {*(TESTS / "covered.txt").read_text(encoding="utf-8").splitlines()}
-    for item in items:
-        if item.nodeid in covered or item.nodeid.split("[")[0] in covered:
-            item.add_marker(pytest.mark.covered)
-
-
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of all processes of a session."""

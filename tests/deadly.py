@@ -6,7 +6,6 @@ import os
 import signal
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from factory.apps.sweep.grid import Point, Value
 from factory.apps.sweep.recipe import Recipe
@@ -26,11 +25,3 @@ class Deadly(Recipe):
         if seed == 1 or first:
             os.kill(os.getpid(), signal.SIGKILL)
         return super().at(point)
-
-
-@dataclass(frozen=True)
-class Stillborn(Recipe):
-    """Ends the process that it is taken to."""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return os._exit, (7,)

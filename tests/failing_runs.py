@@ -13,31 +13,6 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import read
 from tests.paths import PAPER
 
-FAULTS = """
-clear = 2
-
-[[fault]]
-kind = "bad_part"
-label = "part1"
-unit = 1
-
-[[fault]]
-kind = "drop"
-label = "part2"
-unit = 2
-
-[[fault]]
-kind = "bad_joint"
-label = "sub1"
-unit = 3
-metres = 2e-3
-
-[[fault]]
-kind = "dead"
-robot = "r2"
-unit = 3
-"""
-
 CAMPAIGN = Campaign(
     (
         Deviation("bad_part", label="part1", unit=1),
@@ -58,10 +33,7 @@ def paper_layout() -> Layout:
 
 
 def failing(
-    path: Path,
-    world: WorldName = "mujoco",
-    units: int = 4,
-    campaign: Campaign = CAMPAIGN,
+    path: Path, world: WorldName = "mujoco", units: int = 4, campaign: Campaign = CAMPAIGN
 ) -> Log:
     """The log of a run in which all of a campaign happens."""
     request = RunRequest(world, units=units, recovers=True)

@@ -18,6 +18,135 @@ from pathlib import Path
 
 from tests.paths import ROOT
 
+MOST = 100
+"""How many names the interface may have."""
+
+ENTRY = re.compile(r"^ +(\w+(?:, \w+)*):", re.M)
+"""A line of a docstring that explains names."""
+
+
+def homes(house: House) -> Iterator[tuple[str, str]]:
+    """The names of the interface, each with its module, as its table says."""
+    for node in house.modules["api"].tree.body if "api" in house.modules else ():
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict):
+            for home, names in ast.literal_eval(node.value).items():
+                yield from ((name, home) for name in names.split())
+
+
+def interface(house: House) -> Iterator[str]:
+    """Names past the most that the interface may have, names that two modules give, and names that
+    a type checker sees elsewhere than at run time."""
+    table = [*homes(house)]
+    if len(table) > MOST:
+        yield f"api: {len(table)} names; at most {MOST}"
+    names = [name for name, _ in table]
+    yield from (f"api.{name}: twice" for name in sorted({n for n in names if names.count(n) > 1}))
+    at_run = {f"{home}.{name}" for name, home in table}
+    for_types = house.names(house.modules["api"]) if table else set()
+    yield from (f"api: {name} is in one list only" for name in sorted(at_run ^ for_types))
+
+
+def undocumented(house: House) -> Iterator[str]:
+    """Names of the interface without a docstring where they are defined, and docstrings that do not
+    explain each public attribute or argument under `Attributes:` or `Args:`."""
+    for name, home in homes(house):
+        if f"{home}.{name}" in house.modules:
+            continue
+        title, text, parts = documented(house.modules[home], name)
+        if not text:
+            yield f"api.{name}: no docstring in {home}"
+        explained = {
+            one
+            for entry in ENTRY.finditer(text.partition(f"{title}:\n")[2])
+            for one in entry[1].split(", ")
+        }
+        for part in parts:
+            if part not in explained:
+                yield f"api.{name}: '{part}' is not under {title}"
+
+
+def documented(module: Module, name: str) -> tuple[str, str, list[str]]:
+    """The section that a name's docstring needs, the docstring, and what that section explains.
+    A name that its module only imports is explained by the module's docstring."""
+    body = module.tree.body
+    for node, after in zip(body, [*body[1:], None], strict=True):
+        match node:
+            case ast.ClassDef(name=there) if there == name:
+                return "Attributes", ast.get_docstring(node) or "", fields(node)
+            case ast.FunctionDef(name=there) if there == name:
+                every = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
+                return "Args", ast.get_docstring(node) or "", [one.arg for one in every]
+            case ast.Assign(targets=[ast.Name(id=there)]) if there == name:
+                text = after.value if isinstance(after, ast.Expr) else None
+                return "", text.value if isinstance(text, ast.Constant) else "", []
+    return "", ast.get_docstring(module.tree) or "", []
+
+
+def fields(node: ast.ClassDef) -> list[str]:
+    """The public attributes that a class declares."""
+    declared = (one for one in node.body if isinstance(one, ast.AnnAssign))
+    targets = (one.target for one in declared if "ClassVar" not in ast.unparse(one.annotation))
+    names = [one.id for one in targets if isinstance(one, ast.Name)]
+    return [name for name in names if not name.startswith("_")]
+
+
+WORDS = {
+    "deviations": r"deviations?|disturb\w*",
+    "recovery": r"recover\w*|undo\w*|undone|spares?|scrap\w*",
+    "monitor": r"monitor\w*",
+    "live": r"interven\w*|browser",
+    "log": r"logs?|logged|logging",
+    "report": r"html",
+    "plc": r"plc|opcua|opc",
+    "relay": r"relay\w*",
+    "platen": r"platens?|tiles?|tiled",
+    "few robots": r"tees?|stems?",
+    "revise": r"revis\w*",
+    "studies": r"pareto|sweeps? of|fidelity",
+    "mixes": r"mix\w*",
+    "demand": r"demands?|demanded|wip",
+    "manipulators": r"manipulat\w*",
+}
+"""What each app or feature is called, as an expression that a word of it matches whole."""
+
+KEPT = "named_in_core.toml"
+"""The modules that still name one, by its name."""
+
+WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])")
+"""A word of a name or of a text: `with_tees` has two, `MonitorSubject` too."""
+
+
+def named(house: House) -> dict[str, set[str]]:
+    """The modules of the core that name each app or feature, in names or in texts."""
+    rooms = {room for floor in FLOORS for room in floor}
+    patterns = {name: re.compile(pattern) for name, pattern in WORDS.items()}
+    there: dict[str, set[str]] = {name: set() for name in WORDS}
+    for module in house.modules.values():
+        if module.room in rooms:
+            words = {word.lower() for word in WORD.findall(module.text)}
+            for name, pattern in patterns.items():
+                if any(pattern.fullmatch(word) for word in words):
+                    there[name].add(module.name)
+    return there
+
+
+def listed(root: Path) -> dict[str, set[str]]:
+    """The list that is kept."""
+    path = root / "tests" / KEPT
+    kept = tomllib.loads(path.read_text("utf-8")) if path.exists() else {}
+    return {name: {*modules} for name, modules in kept.items()}
+
+
+def named_apps(house: House) -> Iterator[str]:
+    """Modules of the core that name an app and are not in the list, and lines of the list that
+    nothing needs."""
+    kept = listed(house.root)
+    for name, modules in named(house).items():
+        known = kept.get(name, set())
+        yield from (f"{module} names {name}" for module in sorted(modules - known))
+        yield from (f"{module} no longer names {name}" for module in sorted(known - modules))
+
+
 FLOORS = (
     ("support",),
     ("theory.problem",),
@@ -64,12 +193,7 @@ ENTRANCES = (
 the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
-    "support",
-    "engine/mjcf",
-    "engine/record",
-    "engine/simulation/mujoco",
-    "film",
-    "api",
+    *("support", "engine/mjcf", "engine/record", "engine/simulation/mujoco", "film", "api"),
     "apps",
 )
 """Rooms, or parts of rooms, that may import the engine."""
@@ -78,13 +202,8 @@ VAGUE = frozenset({"found", "told", "given", "known", "own"})
 """Names that do not say what a variable is."""
 
 ENGINE_WRITERS = (
-    "engine/simulation/mujoco",
-    "engine/mjcf",
-    "apps/deviations",
-    "apps/recovery",
-    "apps/fidelity/solid",
-    "apps/arms/scene",
-    "apps/arms/sharing",
+    *("engine/simulation/mujoco", "engine/mjcf", "apps/deviations", "apps/recovery"),
+    *("apps/fidelity/solid", "apps/arms/scene", "apps/arms/sharing"),
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""
@@ -109,12 +228,7 @@ VARIANT_ROOMS = ("theory/compiler", "theory/problem/plan", "apps/relay", "apps/f
 
 VARIANT_MARKS = {
     **{"commands": 31, "theory.lang": 28, "apps.pareto": 23, "apps.planning": 17, "pipeline": 11},
-    **{
-        "stages": 8,
-        "apps.exports": 7,
-        "floor.layout": 7,
-        "floor.mating": 5,
-    },
+    **{"stages": 8, "apps.exports": 7, "floor.layout": 7, "floor.mating": 5},
     **{"support": 5, "apps.foreign_nets": 4, "engine.timing": 3, "theory.plant": 2},
     **{"apps.sweep": 1},
 }

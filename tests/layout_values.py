@@ -10,16 +10,11 @@ from dataclasses import replace
 from functools import cache
 from types import MappingProxyType
 
-import numpy as np
-from hypothesis import strategies as st
-
 from factory.floor.geometry.product import product_geometry
-from factory.floor.geometry.solids import Product, Solid
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.guidepath import moved as displaced
 from factory.floor.layout.hands.hand import Point3
-from factory.floor.layout.layout import Layout, branch_of, carriers
-from factory.floor.layout.shapes import is_tool
+from factory.floor.layout.layout import Layout, carriers
 from factory.floor.layout.visits import visits_of
 from factory.theory.problem.pag import PAG, Assembly, Parameter, Value
 from tests.pag_values import SHAPES, factory_of, paper, random_pag
@@ -106,8 +101,6 @@ def _drawn() -> tuple[Drawn, ...]:
 DRAWN = _drawn()
 """Layouts of every shape of tree with parts of every style, which properties of layouts share."""
 
-drawn_layouts = st.sampled_from(DRAWN)
-
 
 def many_layouts(size: int, seeds: range) -> list[Layout]:
     """Layouts of all shapes of trees and styles of parts in turn."""
@@ -167,19 +160,6 @@ def shortened(layout: Layout, robot: int, length: float) -> Layout:
     return with_visits(replace(layout, guidepaths=tuple(paths)), stations_of(layout))
 
 
-def along(layout: Layout, guest: int, by: float) -> Layout:
-    """A robot and all that come to it, moved to a station that is so much nearer to the A end of
-    its carrier [m]."""
-    on, paths = carriers(layout.factory), list(layout.guidepaths)
-    x, y = (by * u for u in paths[on[guest]].heading)
-    for robot in branch_of(on, guest):
-        a = paths[robot].a
-        paths[robot] = replace(paths[robot], a=(round(a[0] + x, 3), round(a[1] + y, 3)))
-    number, stations = layout.factory.last(guest).index, stations_of(layout)
-    stations[number] = round(stations[number] + by, 9)
-    return with_visits(replace(layout, guidepaths=tuple(paths)), stations)
-
-
 def with_path(layout: Layout, robot: int, **changes: object) -> Layout:
     """A layout with one guidepath changed and nothing else."""
     paths = list(layout.guidepaths)
@@ -226,24 +206,3 @@ def _shift(layout: Layout, robot: int, last: int, by: Point3) -> Point3:
         displaced((0.0, 0.0, 0.0, 0.0), visit.shift)
     )
     return ahead + by[0], aside + by[1], below - visit.lift + by[2]
-
-
-def grown(layout: Layout, label: str, by: float) -> Layout:
-    """A part that is larger in plan, on every side, than the layout knows."""
-
-    def larger(solid: Solid) -> Solid:
-        middle, half = (solid.low + solid.high) / 2, (solid.high - solid.low) / 2
-        scale = 1.0 + np.array([by, by, 0.0]) / half
-        low, high = middle - half * scale, middle + half * scale
-        pieces = tuple((piece - middle) * scale + middle for piece in solid.pieces)
-        return replace(solid, low=low, high=high, pieces=pieces)
-
-    product = layout.product
-    solids = {k: larger(s) if k == label else s for k, s in product.solids.items()}
-    changed = Product(solids, product.low, product.high)
-    return replace(layout, product=changed, certificate=None)
-
-
-def robots_with_payload(layout: Layout) -> list[int]:
-    """The robots that are no tools."""
-    return [r.index for r in layout.factory.robots if not is_tool(layout.factory, r.index)]

@@ -228,8 +228,6 @@ RUNNERS: dict[str, Callable[[Any], RunVerdict]] = {
     "settings": _of_settings,
 }
 
-# --- what is done ---------------------------------------------------------------------------------
-
 
 def both(act: Callable[[Any], None]) -> Acts:
     """The same while a run goes on."""
@@ -522,7 +520,6 @@ roof = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.06 ) );
 floor = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, -0.06 ) )"""
 """A box that is closed before its core comes in, 35 mm deep through a wall."""
 
-# --- the table ------------------------------------------------------------------------------------
 
 TABLE: dict[str, dict[str, tuple[str, Any]]] = {
     "engine": {
@@ -720,9 +717,7 @@ TABLE: dict[str, dict[str, tuple[str, Any]]] = {
         "the log says a contact of what is apart": (
             "Record",
             said(
-                unintended_contacts=1,
-                contacts=["r2/carriage - r6/carriage"],
-                contact_first_s=1.0,
+                unintended_contacts=1, contacts=["r2/carriage - r6/carriage"], contact_first_s=1.0
             ),
         ),
         "the log says 99 contacts of many": ("Record", figures(unintended_contacts=99)),

@@ -8,8 +8,6 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-import numpy as np
-
 from benches.speed.factories import balanced
 from benches.speed.factories import laid_out as floor_of
 from factory.apps.few_robots.parallel import in_parallel
@@ -18,7 +16,6 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates, read
-from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.lang import read_pag
 from tests.examples import without_hands
@@ -74,24 +71,6 @@ def state(simulation: Simulation) -> bytes:
     return d.qpos.tobytes() + d.qvel.tobytes() + bytes([d.ncon % 256, seen % 256])
 
 
-def states(simulation: Simulation, tick: Callable[[], object], ticks: int) -> list[bytes]:
-    """The state after each tick."""
-    return [(tick(), state(simulation))[1] for _ in range(ticks)]
-
-
-def gone_wild(simulation: Simulation, seed: int) -> Callable[[], None]:
-    """After a second some robots run wherever they like, past their end stops, and through what
-    rests there; gives what a tick is from then on."""
-    world, rng = simulation.physical, np.random.default_rng(seed)
-    world.m.jnt_limited[:] = False
-    for _ in range(100):
-        simulation.supervisor.step()
-    axes = rng.choice(world.motion.axes.tray, min(6, world.motion.axes.tray), replace=False)
-    at = world.motion.robots.x[axes]
-    world.move(axes, at, rng.uniform(-0.5, 0.5, len(axes)), np.zeros(len(axes)))
-    return lambda: world.advance(5)
-
-
 @contextmanager
 def stepping(step: Callable[..., object]) -> Iterator[None]:
     """The engine is stepped by this function (m, d, steps) meanwhile."""
@@ -105,16 +84,6 @@ def stepping(step: Callable[..., object]) -> Iterator[None]:
         yield
     finally:
         SingleSteps.step = own  # type: ignore[method-assign]
-
-
-def read_by(simulation: Simulation, axes: Any) -> np.ndarray:
-    """What the drives of axes read now (axes, 3): position [m], speed [m/s], force [N]."""
-    world = simulation.physical
-    m, d, actuators = world.m, world.d, world.motion.axes.actuator[axes]
-    found = np.empty((len(actuators), 3))
-    for row, actuator in zip(found, actuators.tolist(), strict=True):
-        row[:] = mujoco.mj_readCtrl(m, d, actuator, d.time, np.zeros((3, 1)), -1)
-    return found
 
 
 def reproduced(units: int = 2) -> Simulation:

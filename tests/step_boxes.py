@@ -47,31 +47,17 @@ class _Writer:
         self.styled.append(self.add(f"STYLED_ITEM('',({style}),{item})"))
 
 
-INCH = (
-    "(CONVERSION_BASED_UNIT('INCH',{})LENGTH_UNIT()NAMED_UNIT({}))",
-    "DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)",
-    "LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),{})",
-)
-"""A unit by its conversion: itself, its exponents and its measure."""
-
-
 def step_of(
     boxes: Mapping[str, Box | Sequence[Box]],
-    inches: bool = False,
     colours: Mapping[str, Mapping[int, Vector]] = MappingProxyType({}),
-    places: Mapping[str, Sequence[Vector]] = MappingProxyType({}),
 ) -> str:
-    """The text of a file of boxes by name, each from its low to its high corner [mm], or [in]; of
-    several boxes one component is made. `colours`: those of some faces of a component's first box,
-    by number, -1 for that of the box, -2 for that of the second. `places`: where the components of
-    an assembly are."""
+    """The text of a file of boxes by name, each from its low to its high corner [mm]; of several
+    boxes one component is made. `colours`: those of some faces of a component's first box, by
+    number, -1 for that of the box, -2 for that of the second."""
     w = _Writer()
     app = w.add("APPLICATION_CONTEXT('automotive design')")
     w.add(f"APPLICATION_PROTOCOL_DEFINITION('','automotive_design',2000,{app})")
     length = w.add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))")
-    if inches:
-        measure = w.add(INCH[2].format(length))
-        length = w.add(INCH[0].format(measure, w.add(INCH[1])))
     angle = w.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
     solid = w.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
     fine = w.add(f"UNCERTAINTY_MEASURE_WITH_UNIT(LENGTH_MEASURE(1.E-6),{length},'','')")
@@ -79,7 +65,6 @@ def step_of(
         f"(GEOMETRIC_REPRESENTATION_CONTEXT(3)GLOBAL_UNCERTAINTY_ASSIGNED_CONTEXT(({fine}))"
         f"GLOBAL_UNIT_ASSIGNED_CONTEXT(({length},{angle},{solid}))REPRESENTATION_CONTEXT('',''))"
     )
-    made = {}
     for name, given in boxes.items():
         several: Sequence[Any] = [given] if isinstance(given[0][0], float | int) else given
         bodies, frame = [], w.frame()
@@ -91,9 +76,7 @@ def step_of(
                     w.paint(body if number < 0 else faces[number], colour)
         items = ",".join([frame, *bodies])
         shape = w.add(f"ADVANCED_BREP_SHAPE_REPRESENTATION('',({items}),{context})")
-        made[name] = shape, frame, _product(w, app, name, shape)
-    if places:
-        _assembly(w, app, context, made, places)
+        _product(w, app, name, shape)
     if w.styled:
         styled = ",".join(w.styled)
         w.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',({styled}),{context})")
@@ -105,8 +88,8 @@ def step_of(
     return head + "\n".join(w.lines) + "\nENDSEC;\nEND-ISO-10303-21;\n"
 
 
-def _product(w: _Writer, app: str, name: str, shape: str) -> str:
-    """A product with a shape; gives its definition."""
+def _product(w: _Writer, app: str, name: str, shape: str) -> None:
+    """A product with a shape."""
     where = w.add(f"PRODUCT_CONTEXT('',{app},'mechanical')")
     made = w.add(f"PRODUCT('{name}','{name}','',({where}))")
     form = w.add(f"PRODUCT_DEFINITION_FORMATION('','',{made})")
@@ -114,34 +97,6 @@ def _product(w: _Writer, app: str, name: str, shape: str) -> str:
     definition = w.add(f"PRODUCT_DEFINITION('design','',{form},{view})")
     given = w.add(f"PRODUCT_DEFINITION_SHAPE('','',{definition})")
     w.add(f"SHAPE_DEFINITION_REPRESENTATION({given},{shape})")
-    return definition
-
-
-def _assembly(
-    w: _Writer,
-    app: str,
-    context: str,
-    made: Mapping[str, tuple[str, str, str]],
-    places: Mapping[str, Sequence[Vector]],
-) -> None:
-    """A product of components at places."""
-    frames = {(name, at): w.frame(at) for name, every in places.items() for at in every}
-    items = ",".join([w.frame(), *frames.values()])
-    whole = w.add(f"SHAPE_REPRESENTATION('',({items}),{context})")
-    top = _product(w, app, "all", whole)
-    for number, ((name, _), frame) in enumerate(frames.items()):
-        shape, origin, definition = made[name]
-        used = w.add(
-            f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{number}','','',{top},{definition},'{number}')"
-        )
-        given = w.add(f"PRODUCT_DEFINITION_SHAPE('','',{used})")
-        moved = w.add(f"ITEM_DEFINED_TRANSFORMATION('','',{origin},{frame})")
-        related = w.add(
-            f"(REPRESENTATION_RELATIONSHIP('','',{shape},{whole})"
-            f"REPRESENTATION_RELATIONSHIP_WITH_TRANSFORMATION({moved})"
-            "SHAPE_REPRESENTATION_RELATIONSHIP())"
-        )
-        w.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({related},{given})")
 
 
 def _brep(w: _Writer, name: str, low: Vector, high: Vector) -> tuple[str, list[str]]:

@@ -195,23 +195,3 @@ def _failures(draw: st.DrawFn, takes: bool, tools: bool) -> tuple[Failure, ...]:
 
 def _is_time(name: str, value: Value) -> bool:
     return isinstance(value, float) and 0 <= value <= DWELL and not name[-1].isdigit()
-
-
-@st.composite
-def mutations(draw: st.DrawFn, text: str) -> str:
-    """A text with some chunks deleted, doubled, swapped or written over."""
-    for _ in range(draw(st.integers(1, 4))):
-        a, b, c = sorted(draw(st.integers(0, len(text))) for _ in range(3))
-        junk = draw(st.text(max_size=4) | st.sampled_from(list(';,()=<>{}~"/+-\n\r\0\ufeff')))
-        text = draw(
-            st.sampled_from(
-                [
-                    text[:a] + text[b:],
-                    text[:a] + junk + text[a:],
-                    text[:a] + junk + text[b:],
-                    text[:a] + text[b:c] + text[a:b] + text[c:],
-                    text[:b] + text[a:b] + text[b:],
-                ]
-            )
-        )
-    return text

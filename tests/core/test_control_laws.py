@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from factory.support.arrays import Array
 from factory.support.errors import InputError
+from factory.theory.control.governed import GovernedAxis, mode_ticks, trajectories
+from factory.theory.control.governor import follow
 from factory.theory.control.laws import LAWS, Setting, law_of
-from factory.theory.control.mode import Mode
+from factory.theory.control.mode import Limits, Mode
+from factory.theory.control.navigation import Bundle
+from factory.theory.control.profile import SpeedProfile
 from factory.theory.problem.template import Law, Point, Template
 
 MATE = Template(
@@ -37,23 +45,6 @@ SETTING = Setting(
 def mode_of(template: Template, setting: Setting) -> Mode:
     """The mode that a template's F gives."""
     return law_of(template)(template, setting)
-
-
-def test_navigation_takes_goals_pairs_and_meetings_from_the_template() -> None:
-    mode = mode_of(MATE, SETTING)
-    assert np.allclose(mode.goals, [0.1, 0.1, 0.8])
-    assert mode.pairs.tolist() == [[0, 1], [0, 2], [1, 2]]
-    assert np.allclose(mode.meet, np.array([[0, 0], [0, 0.8], [0, 0.8]]))
-    assert np.allclose(mode.touch, [0.05, 0.075, 0.075])
-    assert mode.eps == 1e-3 and mode.dwell == 0.0
-    assert mode.trapped == ()
-
-
-def test_meeting_short_of_the_end_and_eps_of_the_template() -> None:
-    meeting = (Point("A", 1), Point("A", 2), Point("B", 3, -2.0))
-    law = replace(MATE.law, eps=2e-3)
-    mode = mode_of(replace(MATE, identifications=(meeting,), law=law), SETTING)
-    assert np.allclose(mode.meet[1], [0.0, 0.6]) and mode.eps == 2e-3
 
 
 def test_stations_gates_width_and_dwell() -> None:
@@ -85,9 +76,8 @@ def test_stations_gates_width_and_dwell() -> None:
         mode_of(insert, replace(setting, station=np.full(2, np.nan)))
 
 
-@pytest.mark.parametrize("name", ["hold", "wait"])
-def test_waiting_is_a_law_too(name: str) -> None:
-    mode = mode_of(replace(MATE, law=replace(MATE.law, name=name)), SETTING)
+def test_waiting_is_a_law_too() -> None:
+    mode = mode_of(replace(MATE, law=replace(MATE.law, name="wait")), SETTING)
     assert mode.is_still and mode.size == 3
 
 
@@ -105,3 +95,99 @@ def test_an_unknown_law_is_named_with_the_nearest() -> None:
         mode_of(replace(MATE, law=law), SETTING)
     assert caught.value.diagnostics[0].hint == "did you mean 'navigation'?"
     assert next(iter(LAWS)) == "navigation"
+
+
+EPS = 2e-4
+TICKS = st.floats(1e-3, 20e-3)
+
+
+def couriers(distance: Array, speed: Array, acceleration: Array) -> Bundle:
+    """Robots that each go its `distance`, every other one down its guidepath, the rest up."""
+    goals = np.where(np.arange(distance.size) % 2, 0.0, distance)
+    mode = Mode(goals, np.zeros(distance.size), distance, EPS)
+    return Bundle.of([mode], [Limits(speed, acceleration)])
+
+
+def run(bundle: Bundle, x: Array, dt: float, seconds: float) -> tuple[Array, Array, Array]:
+    """The governed x, v and acceleration (ticks, n) from rest at x."""
+    v, path = np.zeros_like(x), []
+    for _ in range(int(seconds / dt) + 3):
+        x, v, acceleration = follow(bundle, x, v, dt)
+        path.append((x, v, acceleration))
+    xs, vs, accelerations = (np.array(column) for column in zip(*path, strict=True))
+    return xs, vs, accelerations
+
+
+@settings(max_examples=20, deadline=None)
+@given(TICKS, st.integers(0, 2**32 - 1))
+def test_lands_at_rest_without_overshoot_in_the_trapezoid_time(dt: float, seed: int) -> None:
+    """Forty robots, 1 mm to 5 m each, with limits of their own."""
+    rng, noise, count = np.random.default_rng(seed), 1e-9, 40
+    speed, acceleration = rng.uniform(0.05, 3.0, count), rng.uniform(0.2, 20.0, count)
+    distance = np.minimum(10 ** rng.uniform(-3.0, np.log10(5.0), count), 15.0 * speed)
+    bundle = couriers(distance, speed, acceleration)
+    each = zip(distance.tolist(), speed.tolist(), acceleration.tolist(), strict=True)
+    ideal = np.array([SpeedProfile(v, a).rest(way) for way, v, a in each])
+    xs, vs, accelerations = run(bundle, distance - bundle.goal, dt, ideal.max())
+    left = np.abs(bundle.goal - xs)
+    assert (np.diff(left, axis=0) <= noise).all()
+    assert ((xs >= -noise) & (xs <= distance + noise)).all()
+    assert (np.abs(vs) <= speed + noise).all()
+    assert (np.abs(accelerations) <= acceleration * (1 + noise)).all()
+    rested = (left <= EPS / 10) & (np.abs(vs) <= noise)
+    assert rested[-1].all()
+    took = (np.argmax(rested, axis=0) + 1) * dt
+    assert (took <= ideal + 2 * dt).all()
+    assert (took >= ideal - dt).all()
+
+
+R = 0.1
+
+
+def two(**changes: Any) -> Mode:
+    """Two robots; robot 1's guidepath ends at 0.5 of robot 0's."""
+    values: dict[str, Any] = {
+        "goals": [0.5 + 2 * R, 2 * R],
+        "lower": [0.0, 0.0],
+        "upper": [1.0, 1.0],
+        "eps": 1e-3,
+        "pairs": [[0, 1]],
+        "meet": [[0.5, 0.0]],
+        "touch": [R],
+    }
+    return Mode(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"goals": []}, "shape"),
+        ({"eps": 0.0}, "eps 0"),
+        ({"gate": [-1, 0], "standoff": [0.0, 0.9]}, "robot 2: goal 0.2 with standoff 0.9"),
+        ({"gate": [-1, 2], "standoff": [0.0, 0.1]}, "there are 2 robots"),
+        ({"gate": [1, 0], "standoff": [0.1, 0.1]}, r"robots \[1, 2\] wait for each other"),
+        ({"gate": [1, -1], "standoff": [0.1, 0.0]}, "robot 1 waits for a gate"),
+        ({"touch": [R, R]}, "1 pairs, 1 meet, 2 touch"),
+    ],
+)
+def test_refuses_what_is_no_mode(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        two(**changes)
+
+
+@pytest.mark.parametrize("limits", [([np.inf], [1.0]), ([1.0, 1.0], [1.0])])
+def test_limits_are_positive_and_complete(limits: tuple[list[float], list[float]]) -> None:
+    with pytest.raises(ValueError, match=r"limits|speeds"):
+        Limits(*map(np.array, limits))
+
+
+def test_a_bundle_wants_limits_for_every_robot() -> None:
+    with pytest.raises(ValueError, match="mode 1: 1 limits, 2 robots"):
+        Bundle.of([two(), two()], [Limits(np.ones(2), np.ones(2)), Limits(np.ones(1), np.ones(1))])
+
+
+def test_waiting_takes_a_tick_or_its_dwell() -> None:
+    limits, drive = Limits(np.ones(2), np.ones(2)), GovernedAxis(1.0, 1.0, 0.01)
+    ways = trajectories(Mode.still(2), np.zeros(2), limits, drive)
+    assert mode_ticks(Mode.still(2), ways, 0.01) == 1
+    assert mode_ticks(replace(Mode.still(2), dwell=0.25), ways, 0.01) == 25

@@ -3,49 +3,45 @@ builds."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.geometry.common_places import Top, common_places
 from factory.floor.geometry.product import product_geometry
-from factory.floor.layout.certificate import ARM_BODY, Region
+from factory.floor.geometry.solids import Solid
+from factory.floor.layout.certificate import ALWAYS, ARM_BODY, NAMES, Certificate, Region
+from factory.floor.layout.clearance import certify
 from factory.floor.layout.crowding import Crowding
-from factory.floor.layout.dimensions import ARMS, Clearance
+from factory.floor.layout.dimensions import ARMS, SIDE, Clearance
 from factory.floor.layout.embedding import lay_out
-from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.footprint import footprint
-from factory.floor.layout.guidepath import hull
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import symmetric_shapes
-from factory.floor.layout.sweeps import piles
-from factory.floor.modes.modes import operation_modes
-from factory.support.errors import InputError, RunError
+from factory.pipeline import all_templates
+from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.nets.coordinated import Coordination
 from factory.theory.problem.template import Law, Point
+from tests.examples import with_hands
 from tests.layout_values import (
     DRAWN,
+    STYLES,
     Drawn,
     paper_layout,
     random_layout,
     row_of_inserts,
-    stations_of,
-    table_pag,
+    shortened,
+    with_path,
 )
-from tests.pag_values import TEMPLATES, catalogue, factory_of, paper
-
-
-def test_the_paper_s_example() -> None:
-    """Golden numbers: whole millimetres, so they are exact."""
-    layout = paper_layout()
-    assert round(layout.guidepath_length * 1000) == 1182
-    travels = [round(path.travel * 1000) for path in layout.guidepaths]
-    assert travels == [150, 81, 159, 120, 81, 81]
-    assert layout.area == pytest.approx(0.332, abs=0.001)
-    at = stations_of(layout)
-    stations = {o.label: at[o.index] for o in layout.factory.operations}
-    assert stations["sub1"] == stations["sub3"] == 0.0
-    assert stations["sub2"] == pytest.approx(0.08)
-    assert {path.reach for path in layout.guidepaths[1:]} == {0.08}
+from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper
 
 
 def test_the_same_input_gives_the_same_layout() -> None:
@@ -54,84 +50,11 @@ def test_the_same_input_gives_the_same_layout() -> None:
     assert first.guidepaths == second.guidepaths and first.visits == second.visits
 
 
-@pytest.mark.parametrize("drawn", DRAWN[::2], ids=str)
-def test_robots_meet_where_their_operation_is(drawn: Drawn) -> None:
-    layout = random_layout(*drawn)
-    factory = layout.factory
-    for robot, carrier in enumerate(carriers(layout.factory)):
-        if carrier < 0:
-            continue
-        number = factory.robots[robot].operations[-1]
-        path, on = layout.guidepaths[robot], layout.guidepaths[carrier]
-        assert path.a == pytest.approx(on.middle(layout.station(number)))
-        assert path.middle(path.reach) == path.a
-        assert abs(path.heading[0] * on.heading[0] + path.heading[1] * on.heading[1]) == 0
-    assert len(operation_modes(layout, 2e-4)) == len(factory.operations)
-
-
-@pytest.mark.parametrize("drawn", DRAWN[1::2], ids=str)
-def test_payload_extents_are_those_of_their_parts(drawn: Drawn) -> None:
-    layout = random_layout(*drawn)
-    product, factory = layout.product, layout.factory
-    x, y, _ = product.middle
-    found = piles(factory, product)
-    for label, parts in factory.contents.items():
-        solids = [product.solids[part] for part in parts]
-        wanted = hull([(s.low[0] - x, s.high[0] - x, s.low[1] - y, s.high[1] - y) for s in solids])
-        assert layout.payloads[label] == pytest.approx(wanted)
-        assert found[label].box == pytest.approx(wanted)
-        height = max(s.high[2] for s in solids) - min(s.low[2] for s in solids)
-        assert found[label].z[1] - found[label].z[0] == pytest.approx(height)
-        assert found[label].z[0] >= 0.1 - 1e-9
-
-
 def test_stretching_changes_lengths_alone() -> None:
     """A larger clearance makes paths longer; nothing else is scaled."""
     near, far = (lay_out(paper_layout().factory, paper_layout().product, c) for c in (0.01, 0.04))
     assert near.guidepath_length < paper_layout().guidepath_length < far.guidepath_length
     assert [p.heading for p in near.guidepaths] == [p.heading for p in far.guidepaths]
-
-
-def test_frames_undo_each_other() -> None:
-    for path in paper_layout().guidepaths:
-        box = (-0.1, 0.3, -0.2, 0.05)
-        assert path.world(path.frame(box), (0.0, 0.0)) == pytest.approx(box)
-
-
-# --- floors ---------------------------------------------------------------------------------------
-
-
-def test_a_floor_that_is_large_enough() -> None:
-    layout = paper_layout()
-    xlo, xhi, ylo, yhi = layout.floor
-    again = lay_out(layout.factory, layout.product, floor=(xhi - xlo + 1e-6, yhi - ylo + 1e-6))
-    assert again.floor == layout.floor
-
-
-@pytest.mark.parametrize(
-    ("floor", "words"),
-    [
-        (
-            (0.59, 1.0),
-            ["0.037 m too wide (along the output robot's path)", "to the outfeed's shed"],
-        ),
-        ((2.0, 0.4), ["0.130 m too deep (across it)", "the post of 'part3''s feeder"]),
-        ((0.5, 0.5), ["0.127 m too wide", "0.030 m too deep"]),
-    ],
-)
-def test_a_floor_that_is_too_small(floor: tuple[float, float], words: list[str]) -> None:
-    layout = paper_layout()
-    with pytest.raises(RunError) as caught:
-        lay_out(layout.factory, layout.product, floor=floor)
-    (found,) = caught.value.diagnostics
-    assert found.code == "Layout"
-    assert found.message.startswith("the factory takes 0.627 x 0.530 m of floor: ")
-    for word in words:
-        assert word in found.message
-    assert found.hint.startswith("it fits --floor 0.63x0.53; the longest guidepath is that of r")
-
-
-# --- templates ------------------------------------------------------------------------------------
 
 
 def test_three_guests_at_one_point_are_refused() -> None:
@@ -154,25 +77,6 @@ def test_a_guest_with_its_goal_away_from_a_is_refused() -> None:
         laid_out_with(replace(weld, law=law))
 
 
-def test_goals_that_do_not_meet_fail_the_certificate() -> None:
-    mate = TEMPLATES["mate"]
-    law = replace(mate.law, goals=(Point("A", 1, 3), *mate.law.goals[1:]))
-    with pytest.raises(RunError, match="the goals of mate do not meet"):
-        laid_out_with(replace(mate, law=law))
-
-
-def test_a_carrier_may_stop_ahead_of_its_tools() -> None:
-    """clamp has its goal at S1, 2r ahead of where it would meet them."""
-    rows = [("p", "atomic", "", {}), ("q", "atomic", "", {})]
-    pag = table_pag("y", *rows, ("x", "mate", "p q", {}), ("y", "clamp", "x", {}))  # type: ignore[arg-type]
-    factory = factory_of(pag)
-    layout = lay_out(factory, product_geometry(pag))
-    operation = factory.by_label["y"]
-    ahead = layout.guidepaths[0].middle(layout.goals(operation.index)[0])
-    station = layout.guidepaths[operation.robots[1]].a
-    assert ahead[0] - station[0] == pytest.approx(layout.guidepaths[0].reach)
-
-
 def laid_out_with(template: object) -> Layout:
     """The paper's example with one template replaced, under its own name or as weld."""
     name = template.name if template.name in ("mate", "weld") else "weld"  # type: ignore[attr-defined]
@@ -181,27 +85,137 @@ def laid_out_with(template: object) -> Layout:
     return lay_out(factory, product_geometry(factory.pag))
 
 
-def test_an_insertion_at_a_feeder_keeps_clear_of_its_boom() -> None:
-    """A part that takes another before anything else does so away from the boom over its feeder."""
-    rows = [
-        ("x", "insert", "p q", {}),
-        ("p", "atomic", "", {"box": (0.1, 0.1, 0.02)}),
-        ("q", "atomic", "", {"box": (0.02, 0.02, 0.2), "pos": (0.0, 0.0, 0.1)}),
-    ]
-    pag = table_pag("x", *rows)  # type: ignore[arg-type]
-    layout = lay_out(factory_of(pag), product_geometry(pag))
-    assert stations_of(layout)[layout.factory.by_label["x"].index] >= 0.07
-    boom = feeder_of(layout, "p").boom
-    assert layout.guidepaths[1].a[0] - 0.05 - boom[1] >= 0.02 - 1e-9
+NOTHING = np.full(2, np.inf), np.full(2, -np.inf)
 
 
-def test_later_guests_of_a_row_follow_one_another() -> None:
-    layout = row_of_inserts(7)
-    inserts = [o for o in layout.factory.operations if o.template.name == "insert"]
-    at = stations_of(layout)
-    stations = [at[o.index] for o in reversed(inserts)]
-    assert stations == sorted(stations) and stations[0] > 0
-    assert len(set(stations)) >= 3  # at most two, from either side, at one place
+def solids(shapes: list[tuple[str, float, float]]) -> list[Solid]:
+    """Parts of these shapes at these places in plan."""
+    names = [f"p{n}" for n in range(len(shapes))]
+    parts = (
+        f"{name} = atomic ( {shape}, pos = ( {x}, {y}, 0 ) );"
+        for name, (shape, x, y) in zip(names, shapes, strict=True)
+    )
+    text = f"root = s; s = mate ( {', '.join(names)} ); {' '.join(parts)}"
+    product = product_geometry(read_pag(text, all_templates()))
+    return [product.solids[name] for name in names]
+
+
+def test_needles_nearer_than_pads_can_be_have_none() -> None:
+    needle = "box = ( 0.0002, 0.0002, 0.02 )"
+    parts = solids([(needle, 0.0, 0.0), (needle, 0.0003, 0.0)])
+    assert common_places([Top.of(part, np.zeros(2)) for part in parts], NOTHING) == []
+
+
+def test_an_order_with_its_tokens_exchanged_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = with_hands("truck")
+    assert certify(layout).holds
+    order: Callable[..., None] = Coordination.order
+
+    def exchanged(self: Coordination, place: str, past: Any, start: int, tokens: int) -> None:
+        order(self, place, past, start, 0)
+
+    monkeypatch.setattr(Coordination, "order", exchanged)
+    fault, *_ = (f for f in certify(layout).faults if "for ever" in f.message)
+    assert "order:" in fault.message
+
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def laid_out(seed: int) -> Layout:
+    """A layout of another shape and style for each seed."""
+    shape, style = SHAPES[seed % len(SHAPES)], STYLES[seed % len(STYLES)]
+    return random_layout(7 + seed, seed, shape, style, True)
+
+
+@pytest.mark.parametrize("number", range(8))
+def test_nothing_touches(number: int) -> None:
+    """Two or three units, every robot with a speed and a gain of its own."""
+    layout = laid_out(number)
+    run = Simulation(
+        layout, RunRequest("mujoco", units=2 + number % 2, seed=number, jitter=0.3)
+    ).run()
+    assert run.trouble is None, str(run.trouble)
+    assert run.refines_net
+    assert run.physics is not None
+    assert run.physics.unintended_contacts == 0, run.physics.contacts
+
+
+def test_layers_are_those_of_the_bodies() -> None:
+    certificate = laid_out(0).certificate
+    assert certificate is not None
+    assert tuple(name for name, _, _ in certificate.layers) == NAMES
+
+
+def broken(layout: Layout, *words: str) -> Certificate:
+    """The certificate of a faulty layout, one of whose faults says all the words."""
+    found = certify(layout)
+    assert not found.holds
+    texts = [fault.message for fault in found.faults]
+    assert any(all(word in text for word in words) for text in texts), texts
+    return found
+
+
+@pytest.mark.parametrize("drawn", DRAWN, ids=str)
+def test_every_layout_is_clear(drawn: Drawn) -> None:
+    layout = random_layout(*drawn)
+    assert layout.certificate is not None and layout.certificate.holds
+    assert certify(layout) == layout.certificate
+
+
+def test_what_comes_near_in_the_paper_s_example_is_in_one_gear() -> None:
+    found = paper_layout().certificate
+    assert found is not None and not found.apart.orders
+    met = {frozenset(pair.machines) for pair in found.apart.excluded}
+    assert {frozenset(["r3", "r5"]), frozenset(["r3", "r6"]), frozenset(["r1", "r2"])} <= met
+
+
+def test_layers_and_gaps_are_stated() -> None:
+    found = paper_layout().certificate
+    assert found is not None
+    assert [name for name, _, _ in found.layers] == ["carriages", "masts and arms", "payloads"]
+    assert all(low < high for _, low, high in found.layers)
+    assert all(gap > 0 for _, gap in found.gaps)
+
+
+def test_coupled_regions_belong_to_the_operation_that_takes_the_payload() -> None:
+    layout = paper_layout()
+    assert layout.certificate is not None
+    coupled = [r for r in layout.certificate.regions if r.mode != ALWAYS]
+    assert len(coupled) == 5  # every robot but the tool delivers once
+    for region in coupled:
+        operation = layout.factory.operations[region.mode]
+        assert region.label in operation.before
+
+
+def test_a_fault_says_where_and_by_how_much() -> None:
+    found = certify(shortened(paper_layout(), 4, 0.012))
+    fault = next(fault for fault in found.faults if set(fault.robots) == {"r5", "r3"})
+    assert fault.lacking == pytest.approx(0.012, abs=0.0015 + SIDE)
+    assert len(fault.positions) == 2
+    diagnostic = fault.diagnostic()
+    assert diagnostic.code == "Layout"
+    assert "mm nearer than they may; making a single unit needs both at once" in diagnostic.message
+    assert "test.pag" in diagnostic.hint
+    assert json.dumps(found.as_json())
+
+
+def test_an_insertion_with_a_wrong_standoff(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = row_of_inserts()
+    monkeypatch.setattr(Layout, "standoff", lambda self, operation, slot: 0.0)
+    broken(layout, "mm nearer than they may at the end of")
+    monkeypatch.setattr(Layout, "standoff", lambda self, operation, slot: 2.0)
+    broken(layout, "it could never start")
+
+
+def test_guidepaths_that_cross_or_leave_the_grid() -> None:
+    layout = paper_layout()
+    x, y = layout.guidepaths[5].a
+    broken(with_path(layout, 5, a=(x + 0.0004, y)), "r6", "not in whole millimetres")
+    broken(with_path(layout, 5, travel=0.0), "r6", "has no length")
+    broken(with_path(layout, 5, a=(x - 0.2, y)), "the guidepaths of r5 and r6 cross at")
+    across = with_path(layout, 3, travel=-0.4)
+    broken(across, "the guidepaths of r3 and r4 cross at")
 
 
 def test_a_fault_of_two_regions_says_how_far_they_are_apart_or_in_each_other() -> None:

@@ -9,14 +9,11 @@ from math import atan2, cos, degrees, hypot, sin
 import numpy as np
 import pytest
 
-from factory.engine.mjcf import names
 from factory.engine.mjcf.parts import HIDDEN
-from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.engine.mjcf.replica import Replica
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film.drawn import drawn
 from factory.floor.layout.dimensions import RISE
-from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.layout import Layout
 from factory.support import gl
 from factory.support.engine import mujoco
@@ -145,86 +142,10 @@ def found(paper: Layout) -> list[Jump]:
     return list(jumps(paper, 2))
 
 
-def fed(found: list[Jump]) -> list[Jump]:
-    """Those into a housing."""
-    return [jump for jump in found if jump.places[1][2] > HIDDEN]
-
-
-def gone(found: list[Jump]) -> list[Jump]:
-    """Those out of the shed."""
-    return [jump for jump in found if jump.places[0][2] > HIDDEN]
-
-
-def test_every_part_is_fed_and_every_product_goes(paper: Layout, found: list[Jump]) -> None:
-    """A copy of each part is in its feeder when the run begins."""
-    parts = len(paper.factory.leaves)
-    assert len(fed(found)) == parts and len(gone(found)) == 2 * parts
-
-
-def test_parts_get_into_their_housings(paper: Layout, found: list[Jump]) -> None:
-    for jump in fed(found):
-        feeder = feeder_of(paper, names.label_of(jump.body))
-        solid = paper.product.solids[names.label_of(jump.body)]
-        low, high = (jump.in_sight + end - solid.centre for end in (solid.low, solid.high))
-        xlo, xhi, ylo, yhi = feeder.housing
-        assert xlo < low[0] and high[0] < xhi and ylo < low[1] and high[1] < yhi
-        assert feeder.low < low[2] and high[2] < feeder.high
-
-
-def test_products_go_from_within_the_shed(paper: Layout, found: list[Jump]) -> None:
-    xlo, xhi, ylo, yhi = paper.shed
-    for jump in gone(found):
-        solid = paper.product.solids[names.label_of(jump.body)]
-        low, high = (jump.in_sight + end - solid.centre for end in (solid.low, solid.high))
-        assert xlo < low[0] and high[0] < xhi and ylo < low[1] and high[1] < yhi
-
-
 @pytest.fixture
 def eye(paper: Layout) -> Iterator[Eye]:
     with Eye(paper, model_of(paper, 2)) as eye:
         yield eye
-
-
-@needs_gl
-def test_no_jump_changes_a_pixel(eye: Eye, found: list[Jump]) -> None:
-    """Into every housing, and of a whole unit out of the shed."""
-    for jump in (*fed(found), *gone(found)[: len(fed(found))]):
-        assert not any(eye.sees(jump)), jump.body
-
-
-@needs_gl
-def test_no_jump_is_seen_in_the_drawn_model(paper: Layout, found: list[Jump]) -> None:
-    simulation = Simulation(paper, RunRequest(units=2))
-    made, m = simulation.model, simulation.physical.m
-    seen = [*fed(found), *gone(found)[: len(fed(found))]]
-    with Eye(paper, drawn(m, made.xml, made.files, "overview")) as eye:
-        assert not any(any(eye.sees(jump)) for jump in seen)
-        eye.replica.m.geom_group[eye.geom("outfeed/housing/skin")] = SHOWN
-        assert any(any(eye.sees(jump)) for jump in gone(found))
-
-
-@needs_gl
-@pytest.mark.parametrize("missing", ["wall1", "wall-1", "end1", "end-1", "lid"])
-def test_a_housing_without_a_wall_is_seen_through(
-    eye: Eye, found: list[Jump], missing: str
-) -> None:
-    jump = fed(found)[0]
-    feeder = names.feeder(names.label_of(jump.body))
-    eye.replica.m.geom_group[eye.geom(f"{feeder}/{missing}")] = SHOWN
-    assert any(eye.sees(jump))
-
-
-@needs_gl
-@pytest.mark.parametrize("missing", ["roof", "back", "wall1", "wall-1", "shutter"])
-def test_a_shed_that_is_open_is_looked_into(eye: Eye, found: list[Jump], missing: str) -> None:
-    eye.replica.m.geom_group[eye.geom(f"outfeed/{missing}")] = SHOWN
-    assert any(any(eye.sees(jump)) for jump in gone(found))
-
-
-@needs_gl
-def test_a_roof_that_is_too_short_shows(eye: Eye, found: list[Jump]) -> None:
-    eye.replica.m.geom_size[eye.geom("outfeed/roof"), 0] /= 2
-    assert any(any(eye.sees(jump)) for jump in gone(found))
 
 
 @needs_gl

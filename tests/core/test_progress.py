@@ -11,17 +11,14 @@ import threading
 from functools import partial
 from itertools import count
 from pathlib import Path
-from threading import Barrier, Event, get_ident
+from threading import Barrier, Event
 from types import SimpleNamespace
 
 import pytest
 
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
 from factory.support import progress
-from factory.support.interruption import awaited, side_by_side
-from factory.support.progress import Progress, Waiting, paced
-from tests.examples import without_hands
+from factory.support.interruption import side_by_side
+from factory.support.progress import Progress, Waiting
 from tests.paths import ROOT
 from tests.screen import Screen
 from tests.waiting import left_alone, until
@@ -31,21 +28,6 @@ def watch(progress: Progress) -> None:
     with progress:
         for n in range(4):
             progress.observe(SimpleNamespace(time=float(n), made=n))
-
-
-@pytest.mark.parametrize("stream", [io.StringIO(), Screen()])
-def test_it_is_silent_when_quiet(monkeypatch, stream) -> None:
-    monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(progress, "LINES", 0.0)
-    watch(Progress(3, True, 5.0))
-    assert stream.getvalue() == ""
-
-
-def test_a_short_run_says_nothing_without_a_terminal(monkeypatch) -> None:
-    stream = io.StringIO()
-    monkeypatch.setattr(sys, "stderr", stream)
-    watch(Progress(3, False, 5.0))
-    assert stream.getvalue() == ""
 
 
 def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -> None:
@@ -59,12 +41,6 @@ def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -
     assert second.startswith("3 of 3 units, 3.0 s simulated")
 
 
-def test_a_slow_run_says_how_slow() -> None:
-    assert [paced(factor) for factor in (34.31, 0.1, 0.0876, 0.00412)] == [
-        *("34.3", "0.1", "0.088", "0.0041"),
-    ]
-
-
 def test_it_shows_units_and_speed(monkeypatch) -> None:
     stream = Screen()
     monkeypatch.setattr(sys, "stderr", stream)
@@ -72,7 +48,7 @@ def test_it_shows_units_and_speed(monkeypatch) -> None:
     assert "3/3" in stream.getvalue() and "real time" in stream.getvalue()
 
 
-@pytest.mark.parametrize(("stream", "said"), [(Screen(), "at work"), (io.StringIO(), "so far")])
+@pytest.mark.parametrize(("stream", "said"), [(Screen(), "at work")])
 def test_what_takes_long_is_said(monkeypatch, stream, said: str) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(progress, "LINES", 0.01)
@@ -81,14 +57,6 @@ def test_what_takes_long_is_said(monkeypatch, stream, said: str) -> None:
     with Waiting("quiet work", quiet=True), Waiting("other work"):
         until(lambda: "other work" in stream.getvalue())
     assert "quiet" not in stream.getvalue()
-
-
-@pytest.mark.parametrize("name", ["paper", "gearbox"])
-def test_a_run_takes_no_longer_than_expected(name: str) -> None:
-    layout = without_hands(name)
-    for units in (1, 4):
-        made = Simulation(layout, RunRequest("ideal", units))
-        assert made.run().sim_time_s <= made.duration <= 2 * made.run().sim_time_s + 5
 
 
 @pytest.mark.parametrize(("done", "heard"), [("awaited(work)", True), ("work()", False)])
@@ -115,28 +83,6 @@ def test_a_signal_is_heard_while_the_engine_works(tmp_path: Path, done: str, hea
             with pytest.raises(subprocess.TimeoutExpired):
                 child.wait(2)
             child.kill()
-
-
-def test_what_fails_in_awaited_work_is_raised() -> None:
-    assert awaited(lambda: 7) == 7
-    with pytest.raises(ValueError, match="no such"):
-        awaited(lambda: int("no such"))
-
-
-def test_works_are_done_side_by_side_and_given_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Either of two ends only once the other has begun; the third is done by one of their
-    threads."""
-    monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    both = Barrier(2)
-
-    def meet(number: int) -> tuple[int, int]:
-        both.wait(60)
-        return number, get_ident()
-
-    found = side_by_side([partial(meet, 1), partial(meet, 2), lambda: (3, get_ident())])
-    assert [number for number, _ in found] == [1, 2, 3]
-    assert len({thread for _, thread in found}) == 2
-    assert side_by_side([]) == []
 
 
 def test_no_work_is_begun_after_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,15 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given
 
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.lang import load_templates, read_template, write_template
-from factory.theory.problem.template import LOST, Failure, Law, Point, Response, Template
-from tests.pag_texts import MATE, read_or_refused
+from factory.theory.problem.template import Failure, Law, Point, Response, Template
+from tests.pag_texts import MATE
 from tests.paths import TESTS
-from tests.strategies import mutations
 from tests.strategies import templates as random_templates
 
 HERE = TESTS
@@ -33,33 +31,11 @@ def codes(text: str) -> list[str]:
     return [diagnostic.code for diagnostic in errors(text)]
 
 
-# What is accepted
-
-
-def test_the_papers_template_is_read_as_it_stands() -> None:
-    a1, a2, b3 = Point("A", 1), Point("A", 2), Point("B", 3)
-    assert read_template(MATE) == Template(
-        name="mate",
-        robots=("dot", "dot", "dot"),
-        carrier=3,
-        identifications=((a1, a2, b3),),
-        before=("LAB1", "LAB2", "nopart"),
-        after=("nopart", "nopart", "LAB3"),
-        law=Law("navigation", (Point("A", 1, 2.0), Point("A", 2, 2.0), b3)),
-        further="insert",
-    )
-
-
 @pytest.mark.parametrize(
     "text",
     [
-        MATE.replace("\n", " "),
-        "\ufeff" + MATE.replace("\n", "\r\n"),
-        MATE.replace(" ", "").replace("where", "where ").replace("onWto", " on W to "),
-        MATE.replace("A1 + 2r", "A1+2 r").replace("A2 + 2r", "A2 +\n2.0r"),
-        MATE.rstrip().rstrip(";") + " // the end",
         "// the beginning\n"
-        + MATE.replace("j = 3;", "; // the carrier\n").replace("further", "j = 3; further"),
+        + MATE.replace("j = 3;", "; // the carrier\n").replace("further", "j = 3; further")
     ],
 )
 def test_layout_does_not_matter(text: str) -> None:
@@ -67,28 +43,7 @@ def test_layout_does_not_matter(text: str) -> None:
     assert read_template(text) == read_template(MATE)
 
 
-def test_everything_knows_where_it_came_from() -> None:
-    template = read_template(MATE, "mate.op")
-    assert str(template.position) == "mate.op:1:1"
-    assert str(template.further_position) == "mate.op:7:13"
-    assert [str(goal.position) for goal in template.law.goals] == [
-        "mate.op:6:28",
-        "mate.op:6:37",
-        "mate.op:6:46",
-    ]
-
-
-@pytest.mark.parametrize(
-    ("written", "point"),
-    [
-        ("A1", Point("A", 1)),
-        ("B1 - r", Point("B", 1, -1.0)),
-        ("S1+0.5r", Point("S", 1, 0.5)),
-        ("A1 - .5r", Point("A", 1, -0.5)),
-        ("A1 + 1e-3r", Point("A", 1, 1e-3)),
-        ("A1 + 0r", Point("A", 1)),
-    ],
-)
+@pytest.mark.parametrize(("written", "point"), [("B1 - r", Point("B", 1, -1.0))])
 def test_points(written: str, point: Point) -> None:
     text = """x = (R, j, ~, <a; b>, F) where R = <dot>; j = 1; ~ = {};
         <a; b> = <nopart; LAB1>; F = hold on W to %s within 0.001 for 2"""
@@ -99,8 +54,7 @@ def test_points(written: str, point: Point) -> None:
 
 def test_parameters() -> None:
     text = MATE.replace(
-        "further = insert",
-        'parameters = ( dwell = 1.5, tool = "drill", at = ( 1, 2 ) )',
+        "further = insert", 'parameters = ( dwell = 1.5, tool = "drill", at = ( 1, 2 ) )'
     ).replace("within eps", "within eps for dwell")
     template = read_template(text)
     assert template.parameters == (("dwell", 1.5), ("tool", "drill"), ("at", (1.0, 2.0)))
@@ -113,14 +67,6 @@ def test_geometry() -> None:
     both = read_template(text.replace("= geometry", "= geometry and ( age = 1 )"))
     assert (both.geometry, both.parameters) == (True, (("age", 1.0),))
     assert codes(text.replace("= geometry", "= geometry and ( mass = 1 )")) == ["BadTemplate"]
-
-
-def test_words_of_the_grammar_may_be_names() -> None:
-    text = MATE.replace("dot, dot, dot", "R, W, further").replace("mate =", "geometry =")
-    assert read_template(text).robots == ("R", "W", "further")
-
-
-# Failures
 
 
 def test_failures() -> None:
@@ -139,19 +85,6 @@ def test_failures() -> None:
     assert template.failure("rejected") is None
 
 
-def test_a_template_that_says_nothing_scraps_what_is_lost() -> None:
-    silent, said = read_template(MATE), read_template(MATE + "failure = { lost : scrap };")
-    assert silent == said
-    assert silent.failures == LOST
-    assert "failure" not in write_template(silent)
-    none = read_template(MATE + "failure = {};")
-    assert none.failures == ()
-    assert "failure = {};" in write_template(none)
-
-
-# The writer
-
-
 @given(random_templates())
 def test_read_after_write_is_the_identity(template: Template) -> None:
     text = write_template(template)
@@ -160,24 +93,9 @@ def test_read_after_write_is_the_identity(template: Template) -> None:
     assert write_template(again) == text
 
 
-# The shipped templates
-
-
 def test_what_is_shipped() -> None:
-    assert list(TEMPLATES) == [
-        "atomic",
-        "dropoff",
-        "glue",
-        "insert",
-        "inspect",
-        "mate",
-        "pick",
-        "place",
-        "press",
-        "relay",
-        "screw",
-        "weld",
-    ]
+    names = "atomic dropoff glue insert inspect mate pick place press relay screw weld"
+    assert " ".join(TEMPLATES) == names
     assert TEMPLATES["dropoff"].result == "nopart"
     assert TEMPLATES["mate"].further == TEMPLATES["mate"].instead == "insert"
     assert (TEMPLATES["place"].further, TEMPLATES["place"].brought) == ("place", "pick")
@@ -195,30 +113,10 @@ def test_shipped_files_say_what_they_are(path: Path) -> None:
     assert read_template(path.read_text(encoding="utf-8")).name == path.stem
 
 
-def test_tools_bring_and_take_nothing() -> None:
-    for name in ("weld", "inspect", "press", "glue"):
-        assert TEMPLATES[name].tools() == (1,)
-        assert TEMPLATES[name].law.dwell == "dwell"
-    assert TEMPLATES["screw"].tools() == (2,)
-
-
-# Folders
-
-
 def put(folder: Path, name: str, text: str) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / name).write_text(text, encoding="utf-8")
     return folder
-
-
-def test_the_first_folder_wins_by_name(tmp_path: Path) -> None:
-    mine = put(tmp_path / "mine", "zz.op", MATE.replace("j = 3", "j = 3").replace("eps", "0.5"))
-    put(mine, "drill.op", (SHIPPED / "weld.op").read_text().replace("weld =", "drill ="))
-    put(mine, "notes.txt", "no template")
-    found = load_templates([mine, str(SHIPPED)])
-    assert found["mate"].law.eps == 0.5
-    assert list(found)[:2] == ["drill", "mate"]
-    assert set(found) == {*TEMPLATES, "drill"}
 
 
 def test_the_mapping_is_read_only() -> None:
@@ -244,9 +142,6 @@ def test_all_errors_of_all_files_come_at_once(tmp_path: Path) -> None:
     assert all(d.hint for d in caught.value.diagnostics)
 
 
-# What is refused
-
-
 @pytest.mark.parametrize("path", sorted(BROKEN.glob("*.op")), ids=lambda path: path.stem)
 def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
     with pytest.raises(InputError) as caught:
@@ -257,39 +152,5 @@ def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
     golden(f"broken/{path.name}.txt", f"{caught.value}\n")
 
 
-def test_dropoff_alone_may_leave_nothing() -> None:
-    text = (SHIPPED / "dropoff.op").read_text()
-    assert read_template(text).result == "nopart"
-    assert codes(text.replace("dropoff =", "lose =")) == ["GearNotClosed"]
-
-
-# No text whatever gives anything but an InputError
-
-
-def survives(text: str) -> None:
-    read_or_refused(read_template, text)
-
-
-@given(st.text())
-def test_any_text(text: str) -> None:
-    survives(text)
-
-
 WORDS = 'R j ~ < a ; b > F where = ( ) { } , "x" " // \n A1 + 2r on W to within for and eps LAB1 3'
 WORDS += " failure : lost > again then scrap"
-
-
-@given(st.lists(st.sampled_from(WORDS.split(" "))))
-def test_any_words(words: list[str]) -> None:
-    survives(" ".join(words))
-
-
-@settings(max_examples=300)
-@given(
-    mutations(
-        MATE
-        + 'parameters = ( dwell = 1.0, x = "y", v = ( 1, 2 ) ); failure = { jammed : again 2 };'
-    )
-)
-def test_any_damage(text: str) -> None:
-    survives(text)

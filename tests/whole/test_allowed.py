@@ -56,31 +56,6 @@ def test_an_overlap_is_named_and_fails_a_run(run: Terminal, deep: Path, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("allow", "status"),
-    [
-        (("base:peg",), 0),
-        (("peg:base:0.3mm",), 0),
-        (("0.0004",), 0),
-        (("peg:lid", "0.5mm"), 0),
-        (("peg:base:0.02cm",), 1),
-        (("0.2mm",), 1),
-        (("peg:lid:1mm",), 1),
-    ],
-)
-def test_an_overlap_is_allowed_by_an_option(
-    run: Terminal, deep: Path, tmp_path: Path, allow: tuple[str, ...], status: int
-) -> None:
-    """A run whose log is gone through says the same; what is allowed, and less than there is, is
-    named with both figures."""
-    options = [word for one in allow for word in ("--allow", one)]
-    done = run("run", deep, *options, "--log", tmp_path / "log")
-    assert done.status == status
-    assert run("monitor", tmp_path / "log").status == status
-    assert "0.30 mm when finished" in done.out
-    assert ("and 0.20 mm is allowed" in done.out) == (allow[0] in ("peg:base:0.02cm", "0.2mm"))
-
-
-@pytest.mark.parametrize(
     ("allow", "said"),
     [((), True), (("core:front",), False), (("front:core:36mm",), False), (("34mm",), True)],
 )
@@ -117,7 +92,7 @@ def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
         assert [fault.code for fault in faults] == ["Record", "Blocked"] and not why
 
 
-@pytest.mark.parametrize("word", ["base:pg", "peg:peg", "a:b:c:d", "0.5mi", "-1mm", "peg:", ":1mm"])
+@pytest.mark.parametrize("word", ["base:pg", "a:b:c:d", "-1mm"])
 def test_what_is_no_overlap_to_allow(run: Terminal, deep: Path, word: str) -> None:
     done = run("check", deep, "--allow", word)
     assert done.status == 2 and "--allow" in done.err
@@ -143,11 +118,8 @@ def test_a_pag_allows_overlaps_and_is_written_so() -> None:
     [
         ("allow ( peg, bse, 0.1 )", "UndefinedLabel", "did you mean 'base'?"),
         ("allow ( s, base, 0.1 )", "BadValue", "name the parts of it"),
-        ("allow ( peg, base )", "BadValue", "allow ( peg, frame, 0.0005 )"),
         ("allow ( peg, base, -1 )", "BadValue", "allow ( 0.0005 )"),
-        ("allow ( peg, peg, 1 )", "BadValue", "of two parts"),
         ("allow ( )", "Syntax", "up to a depth"),
-        ("allow ( peg base )", "Syntax", "up to a depth"),
     ],
 )
 def test_what_a_pag_cannot_allow(statement: str, code: str, said: str) -> None:
@@ -155,22 +127,6 @@ def test_what_a_pag_cannot_allow(statement: str, code: str, said: str) -> None:
         read_pag(f"{TEXT % 0.0247} {statement}", TEMPLATES)
     (found,) = error.value.diagnostics
     assert found.code == code and said in f"{found.message} {found.hint}"
-
-
-def test_rounding_is_silent_and_many_pairs_are_told_shortly(run: Terminal, tmp_path: Path) -> None:
-    silent = tmp_path / "silent.pag"
-    silent.write_text(TEXT % 0.024985)
-    assert "overlap" not in run("check", silent).err
-    many = tmp_path / "many.pag"
-    names = [f"p{n}" for n in range(10)]
-    parts = (
-        f"p{n} = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( {0.0199 * n}, 0, 0 ) );"
-        for n in range(10)
-    )
-    many.write_text(f"root = r; r = mate ( {', '.join(names)} ); {' '.join(parts)}")
-    told = run("check", many).err
-    assert told.count("overlap by 0.10 mm") == 6 and "and 3 more pairs overlap" in told
-    assert run("check", many, "-v").err.count("overlap by 0.10 mm") == 9
 
 
 def test_a_peg_too_thick_for_its_hole(run: Terminal, tmp_path: Path) -> None:
@@ -187,32 +143,3 @@ def test_a_peg_too_thick_for_its_hole(run: Terminal, tmp_path: Path) -> None:
     assert pair.depth == pytest.approx(4e-4, abs=1e-8)
     assert run("run", file).status == 1
     assert run("run", file, "--allow", "peg:frame").status == 0
-
-
-PLACED = """root = product; product = mate ( a, b, c );
-a = atomic ( box = ( 0.06, 0.06, 0.01 ) );
-b = atomic ( box = ( 0.06, 0.06, 0.01 ), pos = ( 0, 0, %s ) );
-c = atomic ( box = ( 0.02, 0.02, 0.004 ), pos = ( 0, 0, %s ) );
-"""
-
-
-def test_parts_that_touch_nowhere_or_lie_inside_another_are_named(
-    run: Terminal, tmp_path: Path
-) -> None:
-    """Half a millimetre is play, and a part that reaches out of another is not inside it."""
-    for number, (b, c, found) in enumerate(
-        (
-            (0.01, 0.017, ""),
-            (0.01, 0.0175, ""),
-            (0.406, 0.413, "Apart warning: the parts are 2 groups that do not touch each other"),
-            (0.01, 0.04, "'a' and 1 more, 'c'"),
-            (0.01, 0.01, "Overlap warning: c lies inside b when finished"),
-            (0.01, 0.015, "Overlap warning: b and c overlap by 2.00 mm when finished"),
-        )
-    ):
-        file = tmp_path / f"product{number}.pag"
-        file.write_text(PLACED % (b, c))
-        done = run("check", file)
-        assert done.status == 0
-        assert found in done.err if found else "warning" not in done.err
-        assert ("approach: 2 of 2 operations clear; " in done.out) == (found[:1] != "O")

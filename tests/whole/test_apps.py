@@ -7,17 +7,19 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from factory import commands
-from factory.support import apps
+from factory.support import apps, explanations
 from factory.support.apps import App, layout_variant
 from factory.support.errors import InputError, MissingError
+from factory.support.extensions import extensions
 from tests.command_line import Terminal
-from tests.paths import ROOT
+from tests.paths import PAPER, ROOT
 
 
 def test_the_apps_of_the_house_are_found_by_their_folders() -> None:
@@ -33,10 +35,8 @@ def test_a_variant_that_no_app_gives_is_refused_by_name() -> None:
     assert "platen, relay" in str(refused.value)
 
 
-@pytest.mark.parametrize("given", [App("platen"), "platen"])
-def test_what_is_no_app_of_its_own_is_refused(
-    given: object, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_no_app_of_its_own_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = "platen"
     monkeypatch.setattr(apps, "extensions", lambda kind: {"mine": given})
     apps.apps.cache_clear()
     try:
@@ -121,9 +121,7 @@ def test_an_app_from_outside_gives_a_command(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("word", "place", "why"),
     [
-        ("run", "os:getcwd", "gives the command 'run', which is there already"),
         ("plan", "os:getcwd", "gives the command 'plan', which is there already"),
-        ("hello", "nowhere.at.all:hello", "No module named 'nowhere'"),
         ("hello", "os:hello", "has no attribute 'hello'"),
         ("hello", "json:dumps", "the command 'hello' of an app is no click.Command"),
     ],
@@ -148,7 +146,76 @@ def _forget() -> None:
     commands.places.cache_clear()
 
 
-@pytest.mark.parametrize("table", [{"hello": 3}, {"hello": "module"}, {3: "module:hello"}])
-def test_a_table_of_an_app_has_places(table: Any) -> None:
+def test_a_table_of_an_app_has_places() -> None:
     with pytest.raises(TypeError, match="is no place"):
-        App("greeting", commands=table)
+        App("greeting", commands={3: "module:hello"})
+
+
+CACHES: tuple[Any, ...] = (
+    *(apps.shipped, apps.apps, extensions, commands.places),
+    *(explanations.codes, explanations._shipped),
+)
+"""What is kept of the apps that there are."""
+
+
+Move = Callable[[str], None]
+
+
+def forget(beginning: str) -> None:
+    """Forget imported modules whose names begin so, and what is kept of apps."""
+    for name in [name for name in sys.modules if name.startswith(beginning)]:
+        del sys.modules[name]
+    for cache in CACHES:
+        cache.cache_clear()
+
+
+@pytest.fixture
+def moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Move]:
+    """Moves an app of this package into one of its own, as if that were installed, and out of the
+    folder of apps."""
+    house, here = tmp_path / "apps", dict(sys.modules)
+    there, gone = tmp_path / "site", list[str]()
+    house.mkdir()
+
+    def move(name: str) -> None:
+        package = there / f"outside_{name}"
+        shutil.copytree(apps.FOLDER / name, package, ignore=shutil.ignore_patterns("__pycache__"))
+        for file in package.rglob("*.py"):
+            text = file.read_text("utf-8")
+            file.write_text(text.replace(f"factory.apps.{name}", package.name), "utf-8")
+        data = there / f"{package.name}-1.0.dist-info"
+        data.mkdir()
+        (data / "METADATA").write_text(f"Name: {package.name}\nVersion: 1.0\n")
+        points = f"[factory.apps]\n{name} = {package.name}.app:APP\n"
+        if (package / "explanations").is_dir():
+            points += f"[factory.explanations]\n{name} = {package.name}.explanations\n"
+        (data / "entry_points.txt").write_text(points)
+        for folder in apps.FOLDER.iterdir():
+            if folder.name != name:
+                (house / folder.name).symlink_to(folder)
+        monkeypatch.syspath_prepend(there)
+        monkeypatch.setattr(apps, "FOLDER", house)
+        monkeypatch.setattr(explanations, "APPS", house)
+        forget(f"factory.apps.{name}")
+        gone.append(f"factory.apps.{name}")
+        sys.modules[gone[-1]] = None  # type: ignore[assignment]
+
+    yield move
+    for name in (*gone, "outside_"):
+        forget(name)
+    sys.modules.update(here)
+
+
+def same(run: Terminal, moved: Move, name: str, *words: object) -> Any:
+    """What an app prints in this package, which it prints from a package of its own, too."""
+    here = run(*words)
+    helped = run(words[0], "--help")
+    moved(name)
+    assert run(words[0], "--help") == helped
+    assert run(*words) == here
+    assert f"outside_{name}" in sys.modules and sys.modules[f"factory.apps.{name}"] is None
+    return json.loads(here.out)
+
+
+def test_a_study(run: Terminal, moved: Move) -> None:
+    assert same(run, moved, "analyze", "analyze", PAPER, "--json")["cycle_time_s"] > 1

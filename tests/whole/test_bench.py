@@ -7,17 +7,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benches import reporting
+from benches.compare import manuals
 from benches.compare.__main__ import REPORT as COMPARISON
+from benches.covering import chosen, listed
 from benches.faults.__main__ import REPORT as FAULTS
-from benches.fidelity.__main__ import REPORT as FIDELITY
+from benches.fidelity import long_runs
 from benches.reporting import Report
-from benches.speed import floors, large, processes, production, replaying
+from benches.speed import large, processes
 from benches.speed.__main__ import REPORT
-from benches.speed.factories import laid_out, produce, robots_at_least
-from factory.engine.simulation.simulation import Simulation
 
 KEPT = [
     (report, file)
@@ -36,40 +37,10 @@ def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) ->
 
 
 @pytest.mark.parametrize(
-    "report", [REPORT, FAULTS, FIDELITY, COMPARISON], ids=lambda report: report.path.stem
+    "report", [REPORT, FAULTS, COMPARISON], ids=lambda report: report.path.stem
 )
 def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
     assert report.text() == report.path.read_text()
-
-
-@pytest.mark.parametrize(("asked", "robots"), [(1, 1), (10, 11), (41, 41)])
-def test_a_factory_has_the_robots_asked_for_or_one_more(asked: int, robots: int) -> None:
-    assert len(laid_out(robots_at_least(asked)).factory.robots) == robots
-
-
-@pytest.mark.parametrize("timestep", production.TIMESTEPS)
-@pytest.mark.parametrize("units", [None, 2])
-def test_production_is_measured(timestep: float | None, units: int | None) -> None:
-    found = production.work(4, timestep, fuse=True, units=units, window=0.5)
-    assert found["robots"] == 5 and found["realtime"] > 0
-    assert found["from_s"] == 0.0 if units else found["to_s"] - found["from_s"] >= 0.5
-    assert units is None or found["made"] == units
-
-
-def test_a_run_that_does_not_succeed_is_no_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted: something touches, and nothing fires for longer than is borne."""
-
-    def touched(simulation: Simulation, units: int) -> None:
-        produce(simulation, units)
-        simulation.physical.inspection.onsets.note({(0, 1)}, 1.0)
-
-    with monkeypatch.context() as planted:
-        planted.setattr(production, "produce", touched)
-        with pytest.raises(SystemExit, match="unintended contact"):
-            production.work(4, fuse=True, units=1)
-    monkeypatch.setattr(Simulation, "patience", 0.1)
-    with pytest.raises(SystemExit, match=r"nothing fired for 0\.10 s"):
-        production.work(4, fuse=True, units=1)
 
 
 def test_a_process_that_fails_ends_the_bench_with_what_it_says() -> None:
@@ -114,29 +85,71 @@ def test_a_digest_of_the_physics_is_of_models_and_runs(
     assert (reporting.physics(tmp_path / "oracle.json") != reporting.physics()) == of_it
 
 
-@pytest.mark.parametrize("units", [None, 2])
-@pytest.mark.parametrize("fuse", [False, True])
-def test_the_bare_engine_comes_to_the_same_state(fuse: bool, units: int | None) -> None:
-    """`work` compares the state of the replay with that of the run."""
-    found = floors.work(4, None, fuse=fuse, units=units, window=0.5)
-    assert found["bare"] > 0 and found["run"] > 0
-
-
-def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted fault: setpoints are not written."""
-    replay = replaying.replay
-
-    def forgetful(m, d, writes) -> float:
-        return replay(m, d, [([w for w in written if w[0] != 1], n) for written, n in writes])
-
-    monkeypatch.setattr(replaying, "replay", forgetful)
-    with pytest.raises(AssertionError, match="another state"):
-        floors.work(4, None, units=1)
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(not large.BRICKS.is_dir(), reason="the LDraw products are not here")
 def test_the_import_of_a_large_product_is_measured() -> None:
     (found,) = large.measure(quick=True)
     (row,) = found["rows"]
     assert row["command"] == "import" and row["said"]["parts"] == 1253
+
+
+def test_a_manual_is_read_as_a_tree_of_parts() -> None:
+    """Parts that are equal count as one kind; a step may name what is joined already."""
+    chair = {"parts_ct": 5, "geometric_equivalence_relation": {"1": ["2", "3"], "0,1": ["0,2"]}}
+    kinds = manuals.kinds_of(chair)
+    assert kinds == [0, 1, 1, 1, 4]
+    whole = frozenset({(0, 1), (1, 3), (4, 1)})
+    one_leg, two = frozenset({(0, 1), (1, 1)}), frozenset({(0, 1), (1, 2)})
+    assert manuals.manual([["0", "3"], "1", "2", "4"], kinds) == {one_leg, whole}
+    assert manuals.manual([["0,1", "2"], "3", "4"], kinds) == {two, whole}
+    assert manuals.f1({one_leg, whole}, {one_leg, whole}) == 1.0
+    assert manuals.f1({one_leg, whole}, {two, whole}) == 0.5
+
+
+def test_what_takes_most_new_branches_for_its_time_is_chosen() -> None:
+    taken = {
+        name: np.packbits(np.array(bits, bool))
+        for name, bits in {
+            "wide": [1] * 20 + [0] * 4,
+            "inside": [1] * 10 + [0] * 14,
+            "own": [0] * 18 + [1] * 6,
+            "dear": [0] * 23 + [1],
+        }.items()
+    }
+    cost = {"wide": 2.0, "inside": 1.5, "own": 0.5, "dear": 0.15}
+    assert chosen(taken, cost) == {"wide", "own"}
+    assert chosen({name: taken[name] for name in ("inside", "dear")}, cost) == {"inside", "dear"}
+    assert chosen({"dear": taken["dear"]}, {"dear": 0.3}) == set()
+
+
+def test_a_function_is_listed_once_where_none_of_its_cases_is_kept() -> None:
+    out = {"a.py::one[1]", "a.py::one[2]", "a.py::two[1]"}
+    assert listed(out, {"a.py::two[2]"}) == ["a.py::one", "a.py::two[1]"]
+
+
+def test_a_drift_is_noticed() -> None:
+    noise = np.random.default_rng(0).normal(0, 1e-3, 200)
+    steady = long_runs.compare((0.05 + noise).tolist(), 5, 1e-3)
+    drifting = long_runs.compare((0.05 + noise + 5e-5 * np.arange(200)).tolist(), 5, 1e-3)
+    assert steady["same"] and not drifting["same"]
+
+
+def test_memory_that_grows_is_noticed() -> None:
+    found = {
+        "figures": {},
+        "made": 1,
+        "units": 1,
+        "trouble": None,
+        "refines_net": True,
+        "contacts": 0,
+        "warnings": 0,
+        "growth_kib_a_unit": long_runs.growth([1e5 + 20.0 * n for n in range(100)]),
+        "lost": [],
+    }
+    assert long_runs.faults(found) == ["memory grows by 20.0 KiB a unit"]
+
+
+@pytest.mark.slow
+def test_hundreds_of_units_do_not_drift() -> None:
+    for run in long_runs.measure()["runs"]:
+        assert long_runs.faults(run) == [], run

@@ -13,7 +13,7 @@ import factory
 from factory.apps.exports import exporters
 from factory.engine.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates
-from factory.theory.lang import read_pag, read_template, write_template
+from factory.theory.lang import read_pag
 from factory.theory.problem.robot_types import load_catalogue
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
@@ -25,9 +25,6 @@ from tests.paths import ROOT, files_in
 TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
 ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))
 EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
-
-
-# --- templates ------------------------------------------------------------------------------------
 
 
 def smallest_product(template: Template) -> str:
@@ -47,14 +44,6 @@ def smallest_product(template: Template) -> str:
     return f"root = t; t = weld ( s, dwell = 0.1 ); {operation}; " + "; ".join(made)
 
 
-@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
-def test_templates_read_and_write_back(file: Path) -> None:
-    template = read_template(file.read_text("utf-8"), str(file))
-    assert template.name == file.stem
-    assert read_template(write_template(template)) == template
-    assert all_templates()[file.stem] == template
-
-
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])
 @pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
 def test_templates_run(file: Path, world: str) -> None:
@@ -67,9 +56,6 @@ def test_templates_run(file: Path, world: str) -> None:
     assert run.refines_net
     if world == "mujoco":
         assert_good(run)
-
-
-# --- robot types ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -90,16 +76,6 @@ def test_robot_types_load(name: str) -> None:
     assert ElementTree.parse(robot.mjcf).getroot().get("model") == name
 
 
-@pytest.mark.parametrize("name", ROBOTS)
-def test_robot_types_are_what_they_extend(name: str) -> None:
-    catalogue = load_catalogue()
-    assert catalogue.fits(name, name)
-    ancestor = catalogue[name].extends
-    if ancestor:
-        assert catalogue.fits(name, ancestor)
-        assert not catalogue.fits(ancestor, name)
-
-
 def test_every_file_of_the_folder_is_in_the_catalogue() -> None:
     listed = {robot.mjcf.name for robot in load_catalogue().types.values()}
     assert {path.name for path in (ROOT / "mjcf").glob("*.xml")} == listed
@@ -108,9 +84,6 @@ def test_every_file_of_the_folder_is_in_the_catalogue() -> None:
 def test_templates_ask_for_robots_that_exist() -> None:
     wanted = {robot for template in all_templates().values() for robot in template.robots}
     assert wanted <= set(ROBOTS)
-
-
-# --- exporters ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -133,9 +106,6 @@ def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> N
     one, other = (files_in(tmp_path / name) for name in ("one", "other"))
     assert any(one.values())
     assert one == other
-
-
-# --- examples -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)

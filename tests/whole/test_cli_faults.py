@@ -12,12 +12,11 @@ from typing import Any
 
 import pytest
 
-from tests.command_line import Terminal
-from tests.pag_texts import MATE
+from factory.film.reel import Reel
+from tests.command_line import Terminal, spawn_each
+from tests.core.test_progress import STOPPED, stopped
 from tests.paths import PAPER, ROOT, files_in
 
-BROKEN = sorted((ROOT / "tests" / "broken").glob("*.pag"))
-TEMPLATES = sorted((ROOT / "tests" / "broken").glob("*.op"))
 SMALL = ["--size", "64x48", "--fps", "5"]
 """Films that are soon taken."""
 
@@ -33,8 +32,6 @@ def commands(folder: Path) -> list[list[object]]:
         ["export", "--format", "dot", "-o", folder / "net.dot"],
     ]
 
-
-# --- what libraries say ---------------------------------------------------------------------------
 
 WARNS = """
 import numpy
@@ -52,54 +49,6 @@ def test_warnings_of_libraries_are_for_programmers() -> None:
     ]
     assert [done.returncode for done in said] == [0, 0]
     assert said[0].stderr == "" and "RuntimeWarning" in said[1].stderr
-
-
-# --- broken files ---------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("file", BROKEN, ids=lambda p: p.stem)
-def test_broken_files_write_nothing(run: Terminal, out: Path, file: Path) -> None:
-    """By every command: the same errors, the same status, and nothing is written. A mesh that
-    cannot be read is none of the concern of `programs` and `export`."""
-    needed = [c for c in commands(out) if c[0] in ("build", "run", "render")]
-    shape = run("check", file).status == 0
-    for command, *options in needed if shape else commands(out):
-        done = run(command, file, *options, "--json")
-        assert done.status == 2
-        errors = done.json["errors"]
-        assert errors
-        assert all(e["file"] and e["line"] >= 1 and e["col"] >= 1 for e in errors), command
-        assert files_in(out) == {}
-
-
-@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
-def test_broken_templates_write_nothing(run: Terminal, out: Path, file: Path) -> None:
-    folder = out.parent / "templates"
-    folder.mkdir()
-    (folder / file.name).write_bytes(file.read_bytes())
-    for command, *options in [*commands(out), ["templates"]]:
-        source = [] if command == "templates" else [PAPER]
-        done = run(command, *source, *options, "--templates", folder, "--json")
-        assert done.status == 2
-        assert done.codes
-    assert files_in(out) == {}
-
-
-OWN = MATE.replace("mate =", "op =")
-
-
-@pytest.fixture
-def own(out: Path) -> Path:
-    """A folder with a product of an operation of its own, and that operation."""
-    (out / "op.op").write_text(OWN)
-    (out / "p.pag").write_text("root = c; c = op(a, b); a = atomic(); b = atomic();")
-    return out
-
-
-def test_operations_of_ones_own_are_compiled(run: Terminal, own: Path) -> None:
-    (own / "x").mkdir()
-    for command, *options in commands(own / "x"):
-        assert run(command, own / "p.pag", "--templates", own, *options).status == 0
 
 
 def garbage() -> dict[str, bytes]:
@@ -136,72 +85,6 @@ def test_garbage(run: Terminal, out: Path, name: str) -> None:
         assert done.codes
     assert files_in(out) == {}
 
-
-def test_a_log_is_no_pag(run: Terminal, out: Path) -> None:
-    """Who gives one is told which commands take it."""
-    log = out.parent / "run.log"
-    assert run("run", PAPER, "--world", "ideal", "--log", log, "-q").status == 0
-    takers = {"render", "export"}
-    others = [c for c in commands(out) if c[0] not in takers]
-    for command, *options in [*others, ["analyze"], ["fidelity"], ["view"]]:
-        done = run(command, log, *options, "--json")
-        assert (done.status, done.codes) == (2, ["Usage"])
-        (error,) = done.json["errors"]
-        assert "is a log of a run" in error["message"]
-        assert all(f"`{name}`" in error["hint"] for name in {"monitor", "report", *takers})
-    assert files_in(out) == {}
-
-
-def test_what_is_no_file(run: Terminal, out: Path) -> None:
-    for file in (out, out / "missing.pag", "", "/dev/null", "x" * 300, "a\udcff.pag", PAPER / "x"):
-        for command, *options in commands(out):
-            assert run(command, file, *options, "--json").status == 2
-    assert files_in(out) == {}
-
-
-# --- options --------------------------------------------------------------------------------------
-
-ODD = ["-1", "0", "nan", "inf", "-inf", "1e300", "1e-300", "", "abc", "9" * 400, "0x10", "--", "٣"]
-
-OF_MOTION = ["--speed", "--acceleration", "--force", "--timestep", "--substeps", "--clearance"]
-
-
-@pytest.mark.parametrize("option", [*OF_MOTION, "--floor", "--units", "--wip"])
-def test_odd_numbers_for_build(run: Terminal, out: Path, option: str) -> None:
-    for value in ODD:
-        done = run("build", PAPER, option, value, "--mjcf", out / "m.xml", "--json")
-        assert done.status in (0, 2), value
-        for name in ("m.xml", "m.mjb", "m.mjb.seal") if done.status == 0 else ():
-            (out / name).unlink()
-        assert files_in(out) == {}
-
-
-@pytest.mark.parametrize(
-    "option",
-    [
-        "--units",
-        "--seed",
-        "--jitter",
-        "--wip",
-        "--from",
-        "--max-time",
-        "--world",
-        "--size",
-        "--fps",
-    ],
-)
-def test_odd_numbers_for_run(run: Terminal, out: Path, option: str) -> None:
-    limit = [] if option == "--max-time" else ["--max-time", "9"]
-    for value in ODD:
-        words = [option, value, "--world", "ideal"] if option != "--world" else [option, value]
-        done = run("run", PAPER, *words, *limit, "--log", out / "run.log", "--json")
-        assert done.status in (0, 1, 2), value
-        if done.status == 2:
-            assert files_in(out) == {}
-        (out / "run.log").unlink(missing_ok=True)
-
-
-# --- outputs --------------------------------------------------------------------------------------
 
 OUTPUTS = [
     ["build", "--mjcf"],
@@ -272,46 +155,7 @@ def test_devices_are_written_in_place(run: Terminal, out: Path) -> None:
         assert pipe.read_text().startswith("digraph")
 
 
-def test_a_link_leads_to_the_file(run: Terminal, out: Path) -> None:
-    (out / "real").mkdir()
-    (out / "link.dot").symlink_to(out / "real" / "net.dot")
-    assert run("export", PAPER, "--format", "dot", "-o", out / "link.dot").status == 0
-    assert (out / "link.dot").is_symlink()
-    assert (out / "real" / "net.dot").read_text().startswith("digraph")
-
-
-def test_links_to_themselves(run: Terminal, out: Path) -> None:
-    one, other = out / "one", out / "other"
-    one.symlink_to(other)
-    other.symlink_to(one)
-    for command, *options in commands(out):
-        assert run(command, one, *options, "--json").codes == ["BadFile"]
-    for command, *options in OUTPUTS:
-        assert run(command, PAPER, *options, one, "--json").status == 2
-    assert one.is_symlink() and other.is_symlink()
-
-
-@pytest.mark.parametrize(
-    "name", ["p.xml", "p.mjb", "p.mjb.seal", "p.svg", "p.dot", "p.proof.json", "p_meshes"]
-)
-def test_what_build_names_itself_is_no_link(run: Terminal, out: Path, name: str) -> None:
-    """It would be written elsewhere."""
-    (out / "part.obj").write_bytes((ROOT / "tests/broken/bricks/3001.obj").read_bytes())
-    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
-    (out / "elsewhere").mkdir()
-    (out / "x").mkdir()
-    link = out / "x" / name
-    link.symlink_to(out / "elsewhere" / ("" if name == "p_meshes" else "victim"))
-    before = files_in(out)
-    assert run("build", out / "p.pag", "-o", out / "x", "--json").codes == ["BadFile"]
-    assert files_in(out) == before
-    link.unlink()
-    assert run("build", out / "p.pag", "-o", out / "x", "--json").status == 0
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [("p.xml", ["-o", "."]), ("p.mjb", ["--mjcf", "p.xml"])]
-)
+@pytest.mark.parametrize(("name", "words"), [("p.xml", ["-o", "."])])
 def test_what_build_names_itself_is_not_the_input(
     run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: list[str]
 ) -> None:
@@ -321,44 +165,9 @@ def test_what_build_names_itself_is_not_the_input(
     assert files_in(out) == {name: PAPER.read_bytes()}
 
 
-def test_meshes_are_not_written_over(run: Terminal, out: Path) -> None:
-    brick = (ROOT / "tests/broken/bricks/3001.obj").read_bytes()
-    (out / "p_meshes").mkdir()
-    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
-    (out / "part.obj").write_bytes(brick)
-    assert run("build", out / "p.pag", "-o", out / "x").status == 0
-    (made,) = (out / "x" / "p_meshes").iterdir()
-    (out / "p.pag").write_text(f'root = p; p = atomic(mesh = "p_meshes/{made.name}")')
-    (out / "p_meshes" / made.name).write_bytes(made.read_bytes())
-    before = files_in(out)
-    assert run("build", out / "p.pag", "-o", out, "--json").codes == ["BadFile"]
-    assert files_in(out) == before
-
-
-@pytest.mark.parametrize("name", ["x" * 210, "é" * 122])
-def test_long_names_are_built(run: Terminal, out: Path, name: str) -> None:
-    """Those that begin alike are different files."""
-    file = out / f"{name}.pag"
-    file.write_bytes(PAPER.read_bytes())
-    done = run("build", file, "-o", out / "x", "--json")
-    if done.status == 0:
-        written = files_in(out / "x")
-        assert b"<mujoco" in written[f"{name}.xml"] and b"<svg" in written[f"{name}.svg"]
-    else:  # a name of ours is longer than a name may be
-        assert done.codes == ["BadFile"]
-        assert files_in(out) == {file.name: PAPER.read_bytes()}
-
-
 def test_folders_that_could_not_all_be_made_are_none(run: Terminal, out: Path) -> None:
     assert run("build", PAPER, "-o", out / "one" / ("x" * 300), "--json").codes == ["BadFile"]
     assert not (out / "one").exists()
-
-
-def test_who_may_read_a_file_stays(run: Terminal, out: Path) -> None:
-    file = out / "net.dot"
-    file.touch(0o600)
-    assert run("export", PAPER, "--format", "dot", "-o", file).status == 0
-    assert file.stat().st_mode & 0o777 == 0o600
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
@@ -374,17 +183,6 @@ def test_what_nobody_can_be_told(out: Path, unbuffered: str) -> None:
             assert "Traceback" not in (getattr(done, told) or "")
 
 
-def test_a_build_is_written_whole_or_not_at_all(run: Terminal, out: Path) -> None:
-    """The mesh folder's name is taken by a file."""
-    (out / "part.obj").write_bytes((ROOT / "tests/broken/bricks/3001.obj").read_bytes())
-    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
-    (out / "p_meshes").write_text("mine")
-    before = files_in(out)
-    assert run("build", out / "p.pag", "--mjcf", out / "p.xml", "--json").codes == ["BadFile"]
-    assert run("build", out / "p.pag", "-o", out, "--json").codes == ["BadFile"]
-    assert files_in(out) == before
-
-
 def test_streams_that_are_closed_or_full() -> None:
     factory = f"{sys.executable} -m factory"
     for command, status in (
@@ -398,3 +196,167 @@ def test_streams_that_are_closed_or_full() -> None:
         assert done.returncode == status, command
         assert "Traceback" not in done.stderr
         assert "Exception" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("geometry", "status"),
+    [
+        ("sphere = 0.02, mass = 1e11", {0, 1}),
+        ("sphere = 1, pos = (1e300, 0, 0)", {2}),
+        ("sphere = 1, density = 1e300", {2}),
+        ("sphere = 1e-150, density = 1e-300", {2}),
+    ],
+)
+def test_absurd_products_come_to_an_end(
+    run: Terminal, out: Path, geometry: str, status: set[int]
+) -> None:
+    file = out / "p.pag"
+    file.write_text(f"root = s; s = mate(a, b); a = atomic({geometry}); b = atomic()")
+    done = run("run", file, "--max-time", 10, "--json")
+    assert done.status in status
+    if done.status == 2:
+        assert done.codes == ["BadValue"]
+        assert done.json["errors"][0]["col"] in (44, 47, 56, 60)
+    assert "RuntimeWarning" not in done.err
+
+
+def test_a_film_that_is_stopped_in_its_first_frame_leaves_no_file(
+    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Reel, "until", stopped)
+    monkeypatch.setattr("factory.support.gl.probe", lambda: None)
+    film = out / "film.mp4"
+    assert run("render", PAPER, "-o", film, "--size", "64x48").status == 130
+    assert list(out.iterdir()) == []
+
+
+WITHOUT_GL = {
+    "bogus": {"MUJOCO_GL": "bogus"},
+    "a screen": {"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+    "osmesa": {"MUJOCO_GL": "osmesa"},
+    "EGL drivers": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere", "LIBGL_DRIVERS_PATH": "/nowhere"},
+}
+
+FILMS = (["run", PAPER, "--video"], ["render", PAPER, "-o"])
+
+
+@pytest.mark.parametrize("lacking", WITHOUT_GL)
+def test_only_pictures_need_gl(out: Path, lacking: str) -> None:
+    commands = [
+        *(["check", PAPER, "-q"], ["build", PAPER, "--mjcf", out / "m.xml", "-q"]),
+        *(["programs", PAPER, "-q"], ["export", PAPER, "--format", "pnml", "-q"]),
+        ["run", PAPER, "-q"],
+    ]
+    for done in spawn_each(*commands, **WITHOUT_GL[lacking]):
+        assert done.status == 0, done
+
+
+def test_films_without_gl_say_what_to_install(out: Path) -> None:
+    commands = [[*words, out / "f.mp4", "--json"] for words in FILMS]
+    for done in spawn_each(*commands, MUJOCO_GL="bogus"):
+        assert done.status == 3
+        assert "MUJOCO_GL=egl" in done.json["errors"][0]["hint"]
+    assert files_in(out) == {}
+
+
+@pytest.fixture
+def bare(tmp_path: Path) -> str:
+    """A PYTHONPATH on which importing mujoco fails."""
+    (tmp_path / "bare" / "mujoco").mkdir(parents=True)
+    text = 'raise ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")'
+    (tmp_path / "bare" / "mujoco" / "__init__.py").write_text(text)
+    return f"{tmp_path / 'bare'}:{ROOT}"
+
+
+def test_without_the_engine(bare: str, out: Path) -> None:
+    without = (
+        *(["check", PAPER, "-q"], ["programs", PAPER, "-q"]),
+        *(["export", PAPER, "--format", "dot", "-q"], ["run", PAPER, "--world", "ideal", "-q"]),
+    )
+    needing = (["run", PAPER, "--log", out / "l"], ["build", PAPER, "-o", out / "all"], ["doctor"])
+    commands = *without, *([*words, "--json"] for words in needing)
+    *answers, doctor = spawn_each(*commands, PYTHONPATH=bare)
+    assert [done.status for done in answers] == [0, 0, 0, 0, 3, 3]
+    for done in answers[4:]:
+        assert "mujoco" in done.json["errors"][0]["message"]
+        assert done.json["errors"][0]["hint"] == "pip install mujoco"
+    done = doctor
+    assert done.status == 3
+    assert {c["name"] for c in done.json["checks"] if not c["ok"]} == {"engine", "rendering"}
+    assert list(out.iterdir()) == []
+
+
+def test_the_engine_warns_on_stderr(out: Path) -> None:
+    """Not on stdout, where a document may be, and not in a file in the current folder."""
+    code = (
+        "from factory.support.engine import mujoco\n"
+        "m = mujoco.MjModel.from_xml_string('<mujoco><worldbody><body><freejoint/>"
+        '<geom size=".1"/></body></worldbody></mujoco>\')\n'
+        "d = mujoco.MjData(m); d.qvel[0] = float('nan'); mujoco.mj_step(m, d)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=out,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("engine: ")
+    assert files_in(out) == {}
+
+
+@pytest.mark.parametrize(
+    ("package", "call"),
+    [
+        ("av", "from factory.film.video import _av as called"),
+        ("mujoco.egl", "from factory.support.gl import context\ncalled = lambda: context(8, 8)"),
+    ],
+)
+def test_a_signal_while_a_package_of_pictures_is_imported_is_heard(
+    tmp_path: Path, package: str, call: str
+) -> None:
+    """In a program that uses the library, though the package takes whatever is raised for a library
+    that is missing."""
+    code = f"""
+import signal, sys, types
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+class Deaf(MetaPathFinder, Loader):
+    def find_spec(self, name, path=None, target=None):
+        return ModuleSpec(name, self) if name == {package!r} else None
+    def create_module(self, spec):
+        return None
+    def exec_module(self, module):
+        module.GLContext = lambda *size: types.SimpleNamespace(make_current=lambda: None)
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except BaseException:
+            pass
+{call}
+sys.meta_path.insert(0, Deaf())
+try:
+    called()
+except KeyboardInterrupt:
+    print("heard")
+"""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert done.stdout == "heard\n", done.stderr
+
+
+COMMAND = (
+    f"{STOPPED}from factory import commands\n"
+    "commands.cli.main = lambda *_, **__: __import__('stops') and 5\ncommands.main(['run'])"
+)
+
+
+def test_a_signal_while_something_is_imported(tmp_path: Path) -> None:
+    done = stopped(tmp_path, COMMAND, "missing")
+    assert done.returncode == 130, done.stderr

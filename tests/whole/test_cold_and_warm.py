@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shutil
 import subprocess
 import sys
 from collections import Counter
@@ -14,43 +12,33 @@ from pathlib import Path
 from typing import Any
 from xml.sax import saxutils
 
-import numpy as np
 import pytest
-import rich.table
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lark import Lark
-from rich.box import SIMPLE_HEAD
 from rich.cells import cell_len
-from rich.console import Console
-from rich.text import Text
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull
-from scipy.spatial.transform import Rotation
 
 from factory.apps.drawing import markup
 from factory.commands import places
 from factory.floor.geometry import meshes
-from factory.floor.geometry.pieces import BOX_FACES, box_piece, is_box
-from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.overlaps import Finder
-from factory.pipeline import all_templates
 from factory.support import console as console_module
 from factory.support.cache import load, store
-from factory.support.errors import one_line
 from factory.support.files import user_cache
-from factory.theory.lang import load_pag, pag_syntax
+from factory.theory.lang import pag_syntax
 from factory.theory.lang.recovery import open_grammar
-from factory.theory.nets.components import strong_components
 from tests.command_line import Terminal
+from tests.paths import PAPER
 
 TWO = """root = s; s = mate ( a, b );
 a = atomic ( mesh = "a.stl" ); b = atomic ( mesh = "b.stl", pos = (0, 0, 0.1){more} )"""
 
 BOXES = """root = s; s = mate ( a, b );
 a = atomic ( box = (0.1, 0.1, 0.1) ); b = atomic ( box = (0.1, 0.1, 0.1), pos = (0, 0, 0.1) )"""
+
+ASIDE = ("factory.apps.foreign_nets", "networkx")
+"""What the main road, of nets that were compiled, does without."""
 
 ENGINES = ("trimesh", "scipy", "mujoco", "networkx", "PIL")
 
@@ -107,9 +95,6 @@ def imported(*words: object, cache: Path) -> set[str]:
     return set(done.stderr.split())
 
 
-# --- nothing new --------------------------------------------------------------------------------
-
-
 def test_the_tables_of_a_grammar_are_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     def read() -> Any:
         parser = open_grammar("pag.lark", ["start", "unlawful"], pag_syntax._Builder())
@@ -130,25 +115,6 @@ def test_a_second_check_measures_no_mesh_and_seeks_no_overlap(
     assert work == once
 
 
-def test_the_same_mesh_in_two_files_is_measured_once(
-    run: Terminal, file: Path, work: dict[str, int]
-) -> None:
-    shutil.copy(file.parent / "a.stl", file.parent / "b.stl")
-    run("check", file)
-    assert work["measured"] == 1
-
-
-@pytest.mark.parametrize("more", [", scale = 0.5", ", quat = (1, 1, 0, 0)"])
-def test_what_is_new_is_computed(
-    run: Terminal, file: Path, work: dict[str, int], more: str
-) -> None:
-    run("check", file)
-    before = dict(work)
-    run("check", written(file.parent, more))
-    assert work["measured"] - before["measured"] == ("scale" in more)
-    assert work["searched"] > before["searched"]
-
-
 def test_a_mesh_that_changed_is_measured_again(
     run: Terminal, file: Path, work: dict[str, int]
 ) -> None:
@@ -156,64 +122,6 @@ def test_a_mesh_that_changed_is_measured_again(
     trimesh.creation.box((0.1, 0.1, 0.1)).export(file.parent / "b.stl")
     run("check", file)
     assert work["measured"] == 3
-
-
-def test_another_version_measures_again(
-    run: Terminal, file: Path, work: dict[str, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run("check", file)
-    monkeypatch.setattr("factory.floor.geometry.product.program", lambda *given: "another")
-    run("check", file)
-    assert work["measured"] == 4
-
-
-def test_what_is_kept_is_what_was_found(file: Path) -> None:
-    found = [product_geometry(load_pag(file, all_templates())).solids["b"] for _ in range(2)]
-    for one, other in zip(*(json.loads(json.dumps(listed(s))) for s in found), strict=True):
-        assert one == other
-
-
-def listed(solid: Any) -> list[Any]:
-    assert solid.mesh is not None
-    arrays = (solid.centre, solid.inertia, solid.corners, solid.mesh.vertices, solid.mesh.faces)
-    return [solid.mesh.name, solid.mass, *(a.tolist() for a in (*arrays, *solid.pieces))]
-
-
-# --- the cache ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("folder", ["meshes", "overlaps"])
-def test_a_damaged_entry_is_made_again(
-    run: Terminal, file: Path, work: dict[str, int], cache: Path, folder: str
-) -> None:
-    first = run("check", file, "--json").json
-    entries = {path: path.read_bytes() for path in (cache / folder).iterdir()}
-    assert entries
-    for damage in (empty, rubbish, cut_off, flipped):
-        for path, whole in entries.items():
-            path.write_bytes(damage(whole))
-        before = dict(work)
-        assert run("check", file, "--json").json == first
-        assert work != before
-        assert {path: path.read_bytes() for path in entries} == entries
-
-
-def empty(_: bytes) -> bytes:
-    return b""
-
-
-def rubbish(_: bytes) -> bytes:
-    return b"rubbish"
-
-
-def cut_off(whole: bytes) -> bytes:
-    return whole[:-40]
-
-
-def flipped(whole: bytes) -> bytes:
-    """One bit in the middle."""
-    at = len(whole) // 2
-    return whole[:at] + bytes([whole[at] ^ 1]) + whole[at + 1 :]
 
 
 def test_a_cache_that_cannot_be_written_is_no_error(run: Terminal, file: Path) -> None:
@@ -233,17 +141,14 @@ def test_the_oldest_entries_go_where_they_are_too_many(
     assert sorted(path.stem for path in (cache / "some").iterdir()) == ["a", "c", "d"]
 
 
-# --- what is loaded -----------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("words", "without"),
     [
         (["--version"], ("numpy", "lark", *ENGINES)),
         (["--help"], ("numpy", "lark", *ENGINES)),
-        (["check", "examples/paper.pag"], ("numpy", "rich", *ENGINES)),
-        (["build", "examples/paper.pag", "-o", "out"], UNUSED),
-        (["run", "examples/paper.pag", "--units", "1"], UNUSED),
+        (["check", "examples/paper.pag"], ("numpy", "rich", *ENGINES, *ASIDE)),
+        (["build", "examples/paper.pag", "-o", "out"], (*UNUSED, *ASIDE)),
+        (["run", "examples/paper.pag", "--units", "1"], (*UNUSED, *ASIDE)),
     ],
     ids=["version", "help", "check", "build", "run"],
 )
@@ -279,32 +184,6 @@ def test_boxes_are_checked_without_libraries_of_meshes(tmp_path: Path, cache: Pa
     assert kept == ["grammars"]  # what is computed at once is not kept
 
 
-def test_meshes_that_are_known_are_checked_without_libraries(file: Path, cache: Path) -> None:
-    """But for the edges of their bodies, which hands touch: SciPy finds those."""
-    assert {"trimesh", "scipy"} <= imported("check", file, cache=cache)
-    assert imported("check", file, cache=cache) & set(ENGINES) <= {"scipy"}
-
-
-# --- what is done without a library does what the library does -----------------------------------
-
-CELLS = st.text("ab cé漢[\t\x1b-", min_size=1, max_size=12).map(lambda t: f"x{t}y")
-
-
-@settings(max_examples=25, deadline=None)
-@given(st.integers(1, 5).flatmap(lambda n: st.lists(st.tuples(*[CELLS] * n), min_size=1)))
-def test_a_table_that_is_no_wider_than_its_room_is_that_of_rich(rows: list[Any]) -> None:
-    columns = tuple(f"column {n}" for n in range(len(rows[0])))
-    made = rich.table.Table(title="T", box=SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for column in columns:
-        made.add_column(column)
-    for row in rows:
-        made.add_row(*(Text(one_line(cell)) for cell in row))
-    console = Console(width=console_module.WIDTH, highlight=False)
-    with console.capture() as expected:
-        console.print(made)
-    assert printed_table("T", columns, rows) == expected.get()
-
-
 def printed_table(*table: Any) -> str:
     with redirect_stdout(StringIO()) as out:
         console_module.table(*table)
@@ -326,29 +205,7 @@ def test_markup_is_that_of_the_standard_library(text: str) -> None:
     assert markup.quoteattr(text) == saxutils.quoteattr(text)
 
 
-@given(st.integers(1, 12), st.data())
-def test_strong_components_are_those_of_scipy(size: int, data: st.DataObject) -> None:
-    node = st.integers(0, size - 1)
-    edges = data.draw(st.lists(st.tuples(node, node), max_size=24))
-    before, after = np.array(edges, np.intp).reshape(-1, 2).T
-    links = csr_array((np.ones(len(edges)), (before, after)), (size, size))
-    expected = connected_components(links, connection="strong")[1]
-    found = strong_components(size, before, after)
-    assert ((found[:, None] == found) == (expected[:, None] == expected)).all()
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_the_faces_of_a_box_are_those_of_its_hull(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    half, turn = rng.uniform(1e-4, 1.0, 3), Rotation.random(rng=rng).as_matrix()
-    corners = box_piece(half) @ turn.T + rng.uniform(-9, 9, 3)
-    assert is_box(corners)
-    a, b, c = corners[BOX_FACES].transpose(1, 0, 2)
-    normals = np.cross(b - a, c - a)
-    heights = ((corners[:, None] - a) * normals).sum(axis=2)
-    assert (np.minimum(heights.max(axis=0), -heights.min(axis=0)) < 1e-9).all()
-    area = np.linalg.norm(normals, axis=1).sum() / 2
-    assert area == pytest.approx(ConvexHull(corners).area)
-    moved = corners + 1e-6 * np.eye(8)[rng.integers(8)][:, None]
-    assert not is_box(moved) and not is_box(corners[[1, 0, *range(2, 8)]])
-    assert not is_box(corners[:7]) and not is_box(corners * [1, 1, 0])
+def test_a_net_from_elsewhere_needs_its_room(tmp_path: Path, cache: Path) -> None:
+    net = tmp_path / "paper.pnml"
+    assert not imported("export", PAPER, "--format", "pnml", "-o", net, cache=cache) & {*ASIDE}
+    assert imported("check", net, cache=cache) >= {*ASIDE}

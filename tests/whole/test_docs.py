@@ -36,8 +36,6 @@ FENCE = re.compile(
     r"^```(\{code-block\} text|console)\n(?::caption: (\S+)\n)?(.*?)^```$", re.M | re.S
 )
 
-# --- what is shown is what is printed -------------------------------------------------------------
-
 
 def shown(page: str) -> Iterator[tuple[str, str]]:
     """The blocks of a page to be carried out, in order: a file's name and its text, or "" and a
@@ -164,9 +162,6 @@ def test_what_a_page_quotes_is_printed(page: str, run: Terminal, elsewhere: Path
         assert not missing, f"{command} does not print {missing}"
 
 
-# --- the reference --------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def reference() -> Iterator[dict[str, str]]:
     """The pages that are written from the code, by name."""
@@ -230,8 +225,6 @@ def test_the_readme_is_a_page_that_names_the_two_commands() -> None:
     named = re.findall(r"^ {4}make ([\w-]+)", readme, re.M)
     assert named == ["demo", "test"] and set(named) <= set(targets)
 
-
-# --- the map --------------------------------------------------------------------------------------
 
 WAY = re.compile(r"^\| (\d+) \| `([\w/]+\.py)` ((?:`\w+(?:\.\w+)?`(?:, )?)+) \|", re.M)
 """A row of the way from text to film: its number, a file, and functions or classes in it."""
@@ -321,9 +314,6 @@ def test_every_decision_is_in_the_index() -> None:
         assert headings_of[:3] == ["Context", "Decision", "Figures"], page
 
 
-# --- links and pictures ---------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     "page", [ROOT / "README.md", *WRITTEN], ids=lambda p: p.relative_to(ROOT).as_posix()
 )
@@ -369,9 +359,6 @@ def test_code_that_is_shown_is_there() -> None:
                 inside = named[0].body
             found += 1
     assert found > 20
-
-
-# --- the site -------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

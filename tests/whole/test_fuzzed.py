@@ -35,22 +35,8 @@ from tests.paths import ROOT
 from tests.step_boxes import step_of
 
 WORDS = (
-    *(
-        "",
-        " ",
-        "\0",
-        "\ufeff",
-        "\ud7ff",
-        "é",
-        "日本",
-        "\u202e",
-        "\x1b[31m",
-        "\\",
-        '"',
-        "'",
-        "<",
-        ">",
-    ),
+    *("", " ", "\0", "\ufeff", "\ud7ff", "é", "日本", "\u202e", "\x1b[31m", "\\", '"', "'"),
+    *("<", ">"),
     *("&amp;", "&x;", "&#0;", "<!DOCTYPE x>", "<![CDATA[", "]]>", "<!--", "<a/>", "</net>"),
     *("0", "-0", "-1", "2", "1e308", "-1e999", "nan", "inf", "1_0", "١", "1,5", "0x10", "9" * 30),
     *(",", ";", "\t", "\n", "\r", '",', "../x", "/", "level", "item", "name", "=1+1", "%s", "{0}"),
@@ -137,26 +123,8 @@ def read_tree(folder: Path, draw: Random) -> None:
 
 
 STEP_WORDS = ("#", "#1", "=", "(", ")", "$", "*", ".T.", "DIRECTION('',(0.,0.,0.))", "ENDSEC;")
-GLTF_WORDS = (
-    "[",
-    "]",
-    "{",
-    "}",
-    ":",
-    '"mesh":',
-    '"matrix":[0]',
-    '"bufferView":9',
-    '"scale":[0,0,0]',
-)
-MODEL_WORDS = (
-    "<vertex",
-    'x="',
-    "<component",
-    'objectid="1"',
-    "<triangle",
-    'unit="inch"',
-    "</mesh>",
-)
+GLTF_WORDS = (*"[]{}:", '"mesh":', '"matrix":[0]', '"bufferView":9', '"scale":[0,0,0]')
+MODEL_WORDS = ("<vertex", 'x="', "<component", 'objectid="1"', "<triangle", "</mesh>")
 
 
 @cache

@@ -129,11 +129,7 @@ def test_a_named_output_is_no_input(
 
 
 CHOSEN: list[tuple[list[str], str, str]] = [
-    (
-        ["build", "p.pag", *OPS, "-o", "."],
-        "p.pag part.obj ops/op.op",
-        "p.svg p.xml p.mjb",
-    ),
+    (["build", "p.pag", *OPS, "-o", "."], "p.pag part.obj ops/op.op", "p.svg p.xml p.mjb"),
     (["build", "plan.json", "-o", "sub"], "plan.json layout.json", "plan.json new.ways.json"),
     (
         ["revise", "p.pag", "new.pag", *OPS, "--live", "-o", "sub"],
@@ -221,15 +217,3 @@ def test_functions_write_over_no_input_either(here: Path) -> None:
         with pytest.raises(InputError):
             call()
         assert files_in(here) == before
-
-
-def test_what_was_written_is_read(tmp_path: Path, run: Terminal) -> None:
-    """A command reads its own outputs, those of an earlier call too."""
-    (tmp_path / "new.pag").write_text("root = c; c = mate(a, b); a = atomic(); b = atomic();")
-    for _ in range(2):
-        for words in (
-            ["run", tmp_path / "new.pag", "--world", "ideal", "--log", tmp_path / "run.log"],
-            ["check", tmp_path / "new.pag", "--certificate", tmp_path / "proof.json"],
-            ["build", tmp_path / "new.pag", "-o", tmp_path],
-        ):
-            assert run(*words).status == 0

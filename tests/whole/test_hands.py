@@ -5,27 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
 import factory
+from factory.apps.few_robots.sharing import with_lines
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.runs.watched import watched
-from factory.engine.mjcf import names
 from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.layout.clearance import certify
-from factory.floor.layout.exclusions import awaited_positions, coordinated
-from factory.floor.layout.hands.bores import bores
-from factory.floor.layout.hands.choosing import Hands
-from factory.floor.layout.hands.holding import held
-from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.hands.reach import AIR
-from factory.floor.layout.hands.surfaces import Surfaces, hit, retreat, swept
+from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.in_the_way import IN_THE_WAY
+from factory.floor.layout.hands.misses import THERE, NoGrip
 from factory.floor.layout.layout import Layout
-from factory.pipeline import read
-from tests.paths import EXAMPLES
+from factory.pipeline import Project, read
+from tests.layout_values import with_visits
+from tests.paths import EXAMPLES, ROOT
 
 AT_MOST_MM = 0.1
 """Nothing that is drawn is deeper in anything."""
@@ -69,37 +68,6 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     assert hidden.deepest() < AT_MOST_MM
 
 
-def test_a_large_ball_is_held_at_its_surface(tmp_path: Path) -> None:
-    """What collides is round; its polytope, 0.5 % further out, is not what pads are put to."""
-    file = tmp_path / "balls.pag"
-    file.write_text(
-        "root = two; two = mate(one, other);"
-        "one = atomic(sphere = 0.2); other = atomic(sphere = 0.2, pos = (0.45, 0, 0))"
-    )
-    simulation, hidden = looked_at(factory.lay_out(factory.compile(factory.load_pag(file))), 1)
-    figures = simulation.physical.figures()
-    assert figures.grip_gap_max_mm is not None and 0.0 < figures.grip_gap_max_mm < GRIP_MM
-    assert hidden.deepest() < AT_MOST_MM
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_hand_moved_by_2_mm_is_seen(axis: int) -> None:
-    layout = with_hands("lamp")
-    robot, hand = next(
-        (r, h) for r, h in enumerate(layout.hands) if h is not None and h.kind == "behind"
-    )
-    x, y, z = np.array(hand.places[0]) + 2e-3 * np.eye(3)[axis]
-    moved = replace(hand, places=((float(x), float(y), float(z)),))
-    hands = tuple(moved if r == robot else h for r, h in enumerate(layout.hands))
-    simulation, hidden = looked_at(replace(layout, hands=hands), units=1)
-    heading = np.array([*layout.guidepaths[robot].heading, 0.0])
-    if abs(heading[axis]) < 0.5:
-        return  # along the face it still touches
-    gap = simulation.physical.figures().grip_gap_max_mm
-    assert gap is not None
-    assert gap > GRIP_MM or hidden.deepest() > AT_MOST_MM
-
-
 @pytest.mark.parametrize("way", [-2e-3, 2e-3])
 def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
     """Each hand of the paper's example in turn: away from what it holds, and into it."""
@@ -115,113 +83,196 @@ def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
         assert codes & ({"GripGap"} if way < 0 else {"Contact", "Dropped"}), (robot, codes)
 
 
-def test_pads_are_off_the_surface_by_the_air_between() -> None:
-    for name in ("paper", "lamp", "stool", "shelf"):
-        layout = with_hands(name)
-        surfaces = Surfaces(layout.product)
-        for robot, hand in enumerate(layout.hands):
-            if hand is None or hand.kind != "below":
+BOX = """root = r; r = mate ( a, b ); a = mate ( low, left, right, front, rear, lid );
+low = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.005) );
+left = atomic ( box = (0.01, 0.06, 0.03), pos = (-0.025, 0, 0.025) );
+right = atomic ( box = (0.01, 0.06, 0.03), pos = (0.025, 0, 0.025) );
+front = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, -0.025, 0.025) );
+rear = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, 0.025, 0.025) );
+lid = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.045) );
+b = atomic ( box = (0.03, 0.03, 0.02), pos = (0.06, 0, 0.01) )"""
+"""Walls that are lowered one after the other, by robots from either side."""
+
+
+def laid_out(text: str, folder: Path) -> Layout:
+    """A product laid out with hands."""
+    file = folder / "product.pag"
+    file.write_text(text)
+    return read(file).layout
+
+
+def test_hands_from_either_side_wait_for_each_other(tmp_path: Path) -> None:
+    asked = RunRequest(units=2, jitter=0.3, seed=1, distributed=False)
+    run = watched(Simulation(laid_out(BOX, tmp_path), asked), (), 60.0)
+    assert run.succeeded, run.verdict.failures
+    assert run.products == 2
+
+
+GEARBOX = ROOT / "examples" / "gearbox.pag"
+
+
+def found(file: Path) -> tuple[NoGrip, ...]:
+    return read(file).no_grips
+
+
+@cache
+def of_the_gearbox() -> tuple[NoGrip, ...]:
+    """Of the gearbox whose shafts have their gears before they are lowered into the tub."""
+    text = GEARBOX.read_text()
+    for shaft, gear, whole in (("long", "pinion", "input"), ("short", "gear", "output")):
+        text = text.replace(f"{shaft}_shaft, {gear},", f"{whole},", 1)
+        text += f";\n{whole} = mate ( {shaft}_shaft, {gear} )"
+    with TemporaryDirectory() as folder:
+        copytree(GEARBOX.with_suffix(""), Path(folder) / "gearbox")
+        file = Path(folder) / "gearbox.pag"
+        file.write_text(text)
+        return found(file)
+
+
+def test_a_miss_is_met_by_all_that_it_names() -> None:
+    grip = next(grip for grip in of_the_gearbox() if grip.label == "output")
+    assert {miss.kind for miss in grip.misses} == {"below", "behind", "above"}
+    for miss in grip.misses:
+        assert miss.at is not None and miss.obstacles
+        assert np.abs(miss.tried - miss.at).max(axis=1).min() < 1e-6
+        for obstacle in miss.obstacles:
+            if not obstacle.part:
+                assert obstacle.why in ("weak", "hands", "feeder")
                 continue
-            label = held(layout.factory, robot)
-            parts = layout.factory.contents[label]
-            first = -surfaces.outermost(parts, np.array(hand.places), (2, -1))
-            reach = hand.radius * 0.25
-            assert np.all(first - np.array(hand.places)[:, 2] <= reach + 1e-9)
-            pads = [limb for limb in limbs(layout, robot) if limb.name.endswith("pad")]
-            assert len(pads) == len(hand.places)
-            up = layout.visits[layout.factory.robots[robot].operations[0], robot].elevation
-            low = layout.product.low[2] - 0.1 - up
-            tops = sorted(limb.high[2] + low for limb in pads)
-            assert np.allclose(tops, sorted(z - AIR for _, _, z in hand.places), atol=1e-6)
+            low = np.maximum(obstacle.ways[:, 0], obstacle.bodies[:, 0])
+            high = np.minimum(obstacle.ways[:, 1], obstacle.bodies[:, 1])
+            assert len(low) and (high > low).all()
+            assert obstacle.part in (*grip.parts, *grip.beside)
 
 
-def test_layouts_with_hands_are_certified() -> None:
-    for name in ("paper", "lamp", "stool", "shelf", "chest"):
-        layout = with_hands(name)
-        assert certify(layout).holds
-        hands = {region.robot for region in layout.certificate.regions if region.kind == 9}
-        assert hands == {r for r, hand in enumerate(layout.hands) if hand is not None}
+def test_every_obstacle_of_a_hand_has_words() -> None:
+    assert {*THERE} == {*IN_THE_WAY}
 
 
-def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
-    layout = with_hands("truck")
-    orders = coordinated(layout).orders
-    waited = {order.past.axis for order in orders if order.past is not None}
-    assert waited
-    for axis in waited:
-        assert axis < len(layout.factory.axes)
+PRODUCTS = {
+    "paper": (
+        """root = sub3; sub3 = insert ( sub2, part3 ); sub2 = weld ( sub1 );
+sub1 = insert ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()""",
+        ("part2", "part3"),
+    ),
+    "blocks": (
+        """root = s3; s1 = insert ( base, w1 ); s2 = insert ( s1, w2 ); s3 = insert ( s2, w3 );
+base = atomic ( box = ( 0.2, 0.04, 0.02 ), pos = ( 0, 0, 0.01 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( -0.06, 0.03, 0.01 ) );
+w2 = atomic ( box = ( 0.02, 0.03, 0.02 ), pos = ( 0, 0.035, 0.01 ) );
+w3 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.06, 0.03, 0.01 ) )""",
+        ("w1", "w2", "w3"),
+    ),
+    "steps": (
+        """root = s2; s1 = insert ( base, low ); s2 = insert ( s1, tall );
+base = atomic ( box = ( 0.1, 0.04, 0.02 ), pos = ( 0, 0, 0.01 ) );
+tall = atomic ( box = ( 0.02, 0.02, 0.04 ), pos = ( -0.03, 0.03, 0.02 ) );
+low = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.03, 0.03, 0.01 ) )""",
+        ("low", "tall"),
+    ),
+    "shelf": (
+        """root = s3; s1 = insert ( post, w1 ); s2 = insert ( s1, w2 ); s3 = insert ( s2, w3 );
+post = atomic ( box = ( 0.06, 0.04, 0.12 ), pos = ( 0, 0, 0.06 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.02 ) );
+w2 = atomic ( box = ( 0.03, 0.03, 0.02 ), pos = ( 0, 0.035, 0.06 ) );
+w3 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.01, 0.03, 0.1 ) )""",
+        ("w1", "w2", "w3"),
+    ),
+    "tub": (
+        """root = s2; s1 = insert ( tub, a ); s2 = insert ( s1, b );
+tub = mate ( base, walls ); walls = mate ( left, right, front, back );
+base = atomic ( box = ( 0.1, 0.1, 0.01 ), pos = ( 0, 0, 0.005 ) );
+left = atomic ( box = ( 0.01, 0.1, 0.03 ), pos = ( -0.045, 0, 0.025 ) );
+right = atomic ( box = ( 0.01, 0.1, 0.03 ), pos = ( 0.045, 0, 0.025 ) );
+front = atomic ( box = ( 0.08, 0.01, 0.03 ), pos = ( 0, -0.045, 0.025 ) );
+back = atomic ( box = ( 0.08, 0.01, 0.03 ), pos = ( 0, 0.045, 0.025 ) );
+a = atomic ( box = ( 0.04, 0.04, 0.01 ), pos = ( -0.01, 0, 0.015 ) );
+b = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0.01, 0, 0.025 ) )""",
+        ("a", "b"),
+    ),
+    "ladder": (
+        """root = s2; s1 = insert ( post, w1 ); s2 = insert ( s1, w2 );
+post = atomic ( box = ( 0.06, 0.04, 0.22 ), pos = ( 0, 0, 0.11 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.02 ) );
+w2 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.2 ) )""",
+        ("w1", "w2"),
+    ),
+    "two kinds": (
+        """root = s2; s1 = insert ( base, low ); s2 = insert ( s1, ball );
+base = atomic ( box = ( 0.1, 0.04, 0.06 ), pos = ( 0, 0, 0.03 ) );
+low = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.03, 0.03, 0.01 ) );
+ball = atomic ( sphere = 0.002, pos = ( -0.03, 0.022, 0.05 ), mass = 500 )""",
+        ("low", "ball"),
+    ),
+}
+"""Products and the labels that share a robot: boxes at one height, of two heights, several heights
+beside a post,
+things that are lowered, and one that no hand can hold."""
 
 
-def test_hands_of_carriers_depend_on_their_heading_alone() -> None:
-    layout = with_hands("truck")
-    hands = Hands(layout.factory, layout.product)
-    for robot, path in enumerate(layout.guidepaths[1:], start=1):
-        t = layout.guidepaths[hands.holding.on[robot]].heading
-        back = -t[0], -t[1]
-        if hands.holding.is_carrier(robot):
-            assert hands.hand(robot, path.heading, t) == hands.hand(robot, path.heading, back)
+@cache
+def project(name: str, shared: bool = True) -> Project:
+    """A product with or without a line."""
+    return planned(*PRODUCTS[name], shared)
 
 
-def test_boxes_are_swept_and_hit() -> None:
-    low, high = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0]])
-    box = np.array([[[3.0, 0.2, 0.2], [4.0, 0.8, 0.8]]])
-    assert not hit(low, high, box)[0]
-    assert hit(*swept(low, high, (1.0, 0.0)), box)[0]
-    assert not hit(*swept(low, high, (-1.0, 0.0)), box)[0]
-    aside = box + np.array([-3.5, 5.0, 0.0])
-    assert not hit(*swept(low, high, (1.0, 0.0)), aside)[0]
-    assert retreat(low, high, aside, ((1.0, 0.0), (0.0, 1.0)))[0] == pytest.approx(0.5)
-    assert retreat(low, high, aside, ((-1.0, 0.0), (0.0, 1.0)))[0] == pytest.approx(1.5)
-    assert retreat(low, high, aside, ((1.0, 0.0), (0.0, -1.0)))[0] == 0.0
+def planned(text: str, line: tuple[str, ...], shared: bool = True) -> Project:
+    """A product with or without a line."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "product.pag"
+        file.write_text(text)
+        found = read(file)
+        found = with_lines(found, [line]) if shared else found
+        assert found.layout
+        return found
 
 
-def test_a_hand_is_drawn_of_limbs_that_collide() -> None:
-    simulation = Simulation(with_hands("lamp"), RunRequest(units=1))
-    m = simulation.physical.m
-    drawn = [m.geom(i) for i in range(m.ngeom) if names.pad_of(m.geom(i).name).startswith("r")]
-    assert len(drawn) == sum(hand is not None for hand in with_hands("lamp").hands)
-    assert all(int(geom.contype[0]) and int(geom.conaffinity[0]) for geom in drawn)
+def of_line(layout: Layout) -> tuple[int, Hand]:
+    """The robot with several tours, and its hand."""
+    (robot,) = (r for r, tours in enumerate(layout.factory.tours) if layout.magazine(r)[1:])
+    hand = layout.hand(robot)
+    assert hand is not None
+    return robot, hand
 
 
-def test_bores_are_where_pins_hold() -> None:
-    layout = with_hands("truck")
-    found = list(bores(layout))
-    pinned = {
-        r.name for r in layout.factory.robots if (h := layout.hand(r.index)) and h.tip == "pin"
-    }
-    assert found and {bore.robot for bore in found} == pinned
-    boxes = Surfaces(layout.product)
-    for bore in found:
-        around = boxes.boxes(layout.factory.contents[bore.label])
-        near = (around[:, 0] - 1e-3 <= bore.at) & (around[:, 1] + 1e-3 >= bore.at)
-        assert near.all(axis=1).any() and 0 < bore.diameter <= 0.02
-    assert not list(bores(replace(layout, hands=())))
+def run_of(layout: Layout, distributed: bool = False, seed: int = 1) -> Run:
+    """A run with a monitor beside it."""
+    asked = RunRequest(units=4, jitter=0.3, seed=seed, distributed=distributed)
+    return watched(Simulation(layout, asked), max_time=90.0)
 
 
-def test_robots_do_not_go_back_from_home_to_where_they_would_wait() -> None:
-    """A robot begins at its B end: it has not yet delivered what its hand has to go back from."""
-    layout = with_hands("gearbox")
-    awaited = awaited_positions(layout)
-    short = {r for r, at in awaited.items() if at < layout.guidepaths[r].length - 0.01}
-    made = Simulation(layout, RunRequest(units=1))
-    assert short and all(made.world.sense()[0][robot] > awaited[robot] for robot in short)
-    for _ in range(3):
-        assert not made.supervisor.active.ahead
-        made.supervisor.step()
+def test_a_lift_is_set_at_home_where_its_hand_would_meet_what_waits() -> None:
+    """Part a is put onto a slab, b beside it: the pad is over the slab when it has let go of a, and
+    comes down to where b is."""
+    text = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.02, 0.0302 ) );
+b = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.0602, 0.01 ) )"""
+    layout = planned(text, ("a", "b")).layout
+    assert layout.factory.adjusted == {1} and layout.certificate is not None
+    (order,) = layout.certificate.apart.orders
+    assert order.before.startswith("past:r2:") and order.start == "b_s"
+    run = run_of(layout)
+    assert run.succeeded, run.verdict.failures
+    assert run.physics is not None and run.physics.unintended_contacts == 0
 
 
-def test_however_deep_a_product_is_its_hands_are_found(tmp_path: Path) -> None:
-    """Each robot brings what it made to the next: none is looked for inside another."""
-    deep, pitch = 150, 0.06
-    rows: list[str] = []
-    for n in range(deep):
-        joined = f"insert ( p{n}, s{n - 1} )" if n > 1 else "insert ( p1, p0 )"
-        rows += [f"s{n} = {joined}"] if n else []
-        rows.append(f"p{n} = atomic ( box = (0.05, 0.05, 0.02), pos = ({n * pitch}, 0, 0.01) )")
-    file = tmp_path / "deep.pag"
-    file.write_text(f"root = s{deep - 1}; " + "; ".join(rows))
-    project = read(file)
-    hands = Hands(project.plain, project.product)
-    deepest = len(project.plain.robots) - 1
-    u, t = next(hands.holding.frames(deepest))
-    assert hands.hand(deepest, u, t) is not None
+def test_a_tower_is_not_over_pads_that_have_yet_to_rise() -> None:
+    found = project("ladder")
+    assert of_line(found.layout)[1].kind == "none" and not found.layout.factory.adjusted
+    (told,) = (warning for warning in found.warnings if warning.code == "NoGrip")
+    assert told.message == "no one hand can hold all that r2 brings, 'w1' and 'w2'"
+    assert "behind it can hold each, but not in one place of the hand" in told.hint
+
+
+def moved(layout: Layout, by: tuple[float, float, float]) -> Layout:
+    """A layout in which a robot holds the second label of its line elsewhere than it was found."""
+    robot, _ = of_line(layout)
+    return with_visits(layout, shifts={(robot, 1): by})
+
+
+def test_a_label_that_is_held_2_mm_off_fails_the_run() -> None:
+    run = run_of(moved(project("shelf").layout, (0.002, 0.0, 0.0)))
+    assert not run.succeeded
+    codes = {failure.code for failure in run.verdict.failures}
+    assert "GripGap" in codes, codes

@@ -12,8 +12,8 @@ import pytest
 from factory.apps.foreign_nets import pnml_reader
 from factory.apps.log.content import RECORD
 from factory.support import files, xml_tree
-from factory.support.errors import SHOWN, InputError, did_you_mean
-from factory.support.files import MESH, MIB, NET, TABLE, TEXT, read_bytes
+from factory.support.errors import SHOWN, InputError
+from factory.support.files import MESH, MIB, TABLE, TEXT, read_bytes
 from factory.theory.lang import load_templates, read_pag
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
@@ -30,15 +30,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 READERS = [
-    (["check", "F"], "", TEXT),
-    (["check", "F.pnml"], "", NET),
     (["check", PAPER, "--templates", "own"], "own/x.op", TEXT),
     (["check", "p.pag"], "factory.toml", TABLE),
     (["check", "p.pag"], "p.obj", MESH),
-    (["import", "F.json", "-o", "out"], "", TEXT),
-    (["import", "F.yaml", "-o", "out"], "", TEXT),
-    (["import", "F.csv", "-o", "out"], "", TEXT),
-    (["import", "F.ldr", "-o", "out"], "", TEXT),
     (["import", "t.json", "-o", "out"], "p.obj", MESH),
     (["import", "m.ldr", "--library", "own", "-o", "out"], "own/LDConfig.ldr", TEXT),
     (["monitor", "F"], "", RECORD),
@@ -112,32 +106,6 @@ def test_process_substitution_and_stdin() -> None:
         assert (done.returncode, done.stderr) == (0, b"")
 
 
-def test_looking_at_a_pipe_takes_nothing_from_it(tmp_path: Path) -> None:
-    """Whether a file is a log or a net is seen from its first bytes, of regular files alone."""
-    from factory.apps.log import is_log
-
-    pipe = tmp_path / "pipe"
-    os.mkfifo(pipe)
-    assert not is_log(pipe)
-    assert not files.is_net(pipe)
-
-
-def test_a_mesh_names_no_further_file_that_is_read(
-    run: Terminal, here: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import trimesh
-
-    asked: list[str] = []
-    monkeypatch.setattr(
-        trimesh.resolvers.FilePathResolver, "get", lambda _, name: asked.append(name)
-    )
-    cube = trimesh.creation.box((0.1, 0.1, 0.1)).export(file_type="obj")
-    (here / "p.obj").write_text("mtllib /dev/zero\n" + cube)
-    (here / "p.pag").write_text(PART)
-    assert run("check", "p.pag").status == 0
-    assert asked == []
-
-
 def test_of_many_errors_the_first_are_told_and_the_others_counted(
     run: Terminal, here: Path
 ) -> None:
@@ -154,17 +122,6 @@ def test_of_many_errors_the_first_are_told_and_the_others_counted(
     assert str(caught.value).endswith("... and 23 more errors")
 
 
-def test_few_errors_leave_none_out(run: Terminal, here: Path) -> None:
-    (here / "p.pag").write_text("root = a; a = atomic(); b = atomic();")
-    assert "errors_left_out" not in run("check", "p.pag", "--json").json
-
-
-def test_an_input_of_itself_is_told_once(run: Terminal, here: Path) -> None:
-    """And is not looked for again at each of its mentions."""
-    (here / "p.pag").write_text(f"root = a; a = mate({', '.join('a' * 30)});")
-    assert run("check", "p.pag", "--json").codes == ["PagNotTree"]
-
-
 def test_unknown_nodes_of_a_net_get_few_suggestions(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
     monkeypatch.setattr(pnml_reader, "did_you_mean", lambda name, *_: asked.append(name) or "")
@@ -179,72 +136,6 @@ def test_a_net_of_too_many_elements(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xml_tree, "MOST", 10)
     with pytest.raises(InputError, match="1:31: BadNet it has more than 10 elements"):
         pnml_reader.read_pnml("<a>" * 11 + "</a>" * 11)
-
-
-def test_entities_are_not_expanded(run: Terminal, here: Path) -> None:
-    """A billion laughs."""
-    names = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 10))
-    (here / "n.pnml").write_text(f'<!DOCTYPE l [<!ENTITY l0 "ha">{names}]><pnml>&l9;</pnml>')
-    (error,) = run("check", "n.pnml", "--json").json["errors"]
-    assert error["message"] == "a document type declaration is not accepted"
-
-
-def test_aliases_are_not_multiplied(run: Terminal, here: Path) -> None:
-    """A YAML document of 2^40 nodes in 40 lines."""
-    lines = [f"  - &b{i} {{name: n{i}, children: [*b{i - 1}, *b{i - 1}]}}" for i in range(1, 41)]
-    first = "  - &b0 {name: n0, box: [1, 1, 1]}"
-    (here / "t.yaml").write_text("\n".join(["name: top", "children:", first, *lines]))
-    assert run("import", "t.yaml", "-o", "out", "--json").codes == ["TooLarge"]
-
-
-@pytest.mark.parametrize("value", ["1e300", "86401"])
-def test_a_dwell_has_an_end(run: Terminal, here: Path, value: str) -> None:
-    (here / "p.pag").write_text(f"root = b; b = weld(a, dwell = {value}); a = atomic();")
-    (error,) = run("run", "p.pag", "--json").json["errors"]
-    assert error["code"] == "BadValue"
-    assert error["message"] == f"'dwell' takes a number from 0 to 86400, not '{value}'"
-    own = (ROOT / "templates" / "weld.op").read_text()
-    for old, new in (("dwell = 1.0", f"dwell = {value}"), ("for dwell", f"for {value}")):
-        assert old in own
-        (here / "weld.op").write_text(own.replace(old, new))
-        done = run("check", PAPER, "--templates", here, "--json")
-        assert done.codes == ["BadTemplate"]
-        assert "from 0 to 86400" in done.json["errors"][0]["hint"]
-
-
-@pytest.mark.parametrize(
-    ("words", "bound"),
-    [
-        (["run", PAPER, "--max-time", "1e300"], "0<x<=1000000000.0"),
-        (["run", PAPER, "--seed", str(2**63)], f"0<=x<={2**63 - 1}"),
-        (["report", PAPER, "-o", "o.html", "--max-time", "1e10"], "0<x<=1000000000.0"),
-        (["build", PAPER, "--cycle", "1e300"], "0<x<=1000000000.0"),
-        (["build", PAPER, "--floor", "1e300x1"], "two positive numbers up to 100000"),
-        (["build", PAPER, "--speed", "1e300"], "not between 0.001 and 100"),
-    ],
-    ids=str,
-)
-def test_numbers_have_bounds(run: Terminal, here: Path, words: list[object], bound: str) -> None:
-    (error,) = run(*words, "--json").json["errors"]
-    assert bound in error["message"]
-
-
-def test_messages_and_hints_are_cut(run: Terminal, here: Path) -> None:
-    (here / "n.pnml").write_text(
-        NET_OF.format(
-            f'<place id="p"><initialMarking><text>{"1" * 10**6}</text></initialMarking></place>'
-        )
-    )
-    (here / "p.pag").write_text(f"root = a; a = mate(b, c{'c' * 10**6}); b = atomic();")
-    for file in ("n.pnml", "p.pag"):
-        done = run("check", file, "--json")
-        assert done.status == 2
-        assert len(done.out) < 5_000 and len(done.err) < 5_000
-
-
-def test_very_long_words_are_not_compared() -> None:
-    assert did_you_mean("inspekt", ["inspect"]) == "did you mean 'inspect'?"
-    assert did_you_mean("inspect" * 10**6, ["inspect"]) == "valid names: inspect"
 
 
 def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch) -> None:

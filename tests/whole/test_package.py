@@ -9,7 +9,6 @@ import os
 import shutil
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,50 +18,26 @@ import pytest
 import factory
 from factory.pipeline import read
 from factory.support import namesake
-from tests.apps.planning.test_plan_puzzles import PEG
+from tests.apps.planning.test_plan_models import PEG
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
 from tests.paths import PAPER, ROOT
 from tests.plan_puzzles import pinwheel, source
 
-# --- values are checked when made, with the codes of the command line -----------------------------
-
 WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
     (lambda p: factory.run(p, world="moojoco"), ("run", PAPER, "--world", "moojoco")),
-    (lambda p: factory.run(p, units=-1), ("run", PAPER, "--units", -1)),
-    (lambda p: factory.run(p, units=2.5), ("run", PAPER, "--units", 2.5)),
-    (lambda p: factory.run(p, seed=-1), ("run", PAPER, "--seed", -1)),
-    (lambda p: factory.run(p, jitter=2), ("run", PAPER, "--jitter", 2)),
-    (lambda p: factory.run(p, max_time=0), ("run", PAPER, "--max-time", 0)),
     (lambda p: factory.run(p, start="nowhere"), ("run", PAPER, "--from", "nowhere")),
     (
         lambda p: factory.run(p, distributed=True, spares=1),
         ("run", PAPER, "--distributed", "--spares", 1),
     ),
-    (lambda p: factory.Settings(clearance=-3), ("run", PAPER, "--clearance", -3)),
-    (lambda p: factory.Settings(speed=float("nan")), ("run", PAPER, "--speed", "nan")),
-    (lambda p: factory.lay_out(p, floor=(0, 3)), ("build", PAPER, "--floor", "0x3")),
-    *(
-        (lambda p, floor=floor: factory.lay_out(p, floor=floor), ("build", PAPER, "--floor", floor))
-        for floor in ("4", "4x3x2", "fourx3", "-4x3", "nanx3", "1e9x3", "\u0664x3", "")
-    ),
-    (lambda p: factory.lay_out(p, floor=(0.3, 0.3)), ("build", PAPER, "--floor", "0.3x0.3")),
-    (
-        lambda p: factory.lay_out(p, relay=True, tile=0.24),
-        ("build", PAPER, "--relay", "--tile", 0.24),
-    ),
-    (lambda p: factory.compile(p, robots=0), ("check", PAPER, "--robots", 0)),
+    (lambda p: factory.lay_out(p, floor="1e9x3"), ("build", PAPER, "--floor", "1e9x3")),
     (lambda p: factory.compile(p, robots=2), ("check", PAPER, "--robots", 2)),
     (lambda p: factory.compile(p, cycle=-1), ("check", PAPER, "--cycle", -1)),
     (lambda p: factory.compile(p, parallel={"sub9": 2}), ("check", PAPER, "--parallel", "sub9=2")),
     (lambda p: factory.build(p, wip=0), ("build", PAPER, "--wip", 0)),
     (lambda p: factory.export(p, "pnlm"), ("export", PAPER, "--format", "pnlm")),
     (lambda p: factory.export(p, "csv"), ("export", PAPER, "--format", "csv")),
-    (
-        lambda p: factory.export(p, "dot", of="nose"),
-        ("export", PAPER, "--format", "dot", "--of", "nose"),
-    ),
-    (lambda p: factory.analyze(p, second=["r99"]), ("analyze", PAPER, "--second", "r99")),
     (lambda p: factory.analyze(p, faster={"r1": -3}), ("analyze", PAPER, "--faster", "r1=-3")),
     (
         lambda p: factory.sweep(p, "a.db", {"sed": [1]}),
@@ -72,7 +47,6 @@ WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
         lambda p: factory.sweep(p, "a.db", {"jitter": [7]}),
         ("sweep", PAPER, "--vary", "jitter=7", "-o", "a.db"),
     ),
-    (lambda p: factory.render(p, "a.gif"), ("render", PAPER, "-o", "a.gif")),
     (
         lambda p: factory.render(p, "a.png", camera="nose"),
         ("render", PAPER, "-o", "a.png", "--camera", "nose"),
@@ -105,10 +79,9 @@ def test_a_wrong_call_gives_the_code_of_the_command(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("floor", [(4,), (4, "3"), (True, 3), 4, b"4x3", {3.0, 4.0}], ids=repr)
-def test_a_floor_is_two_lengths(floor: Any) -> None:
+def test_a_floor_is_two_lengths() -> None:
     with pytest.raises(factory.InputError, match="is not two positive lengths"):
-        factory.lay_out(PAPER, floor=floor)
+        factory.lay_out(PAPER, floor=4)
 
 
 def test_a_floor_is_given_in_numbers_or_as_a_command_takes_it() -> None:
@@ -123,9 +96,6 @@ def test_what_is_no_product_is_told() -> None:
         factory.run(42)  # type: ignore[arg-type]
 
 
-# --- the functions do what the commands do --------------------------------------------------------
-
-
 def test_every_stage_gives_the_same_run() -> None:
     pag = factory.load_pag(PAPER)
     plan = factory.compile(pag)
@@ -133,16 +103,6 @@ def test_every_stage_gives_the_same_run() -> None:
     stages = (str(PAPER), PAPER, pag, plan, layout, read(PAPER))
     runs = [factory.run(stage, units=2, seed=3, jitter=0.2).events for stage in stages]
     assert all(run == runs[0] for run in runs)
-
-
-def test_a_layout_is_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout = factory.lay_out(PAPER, clearance=0.03)
-    monkeypatch.setattr("factory.floor.layout.request.Ground.lay_out", None)
-    built = factory.build(layout)
-    assert built.model.settings.clearance == 0.03
-    assert factory.analyze(layout).timing.layout is layout
-    with pytest.raises(TypeError):
-        factory.build(layout.factory)  # the fault that is planted: this one is laid out
 
 
 def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
@@ -159,28 +119,6 @@ def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
     assert again.events == factory.run(PAPER, units=2).events
 
 
-def test_an_export_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
-    for form in ("pnml", "svg", "st"):
-        text = factory.export(PAPER, form, tmp_path / form)
-        assert isinstance(text, str)
-        assert run("export", PAPER, "--format", form).out == text.rstrip("\n") + "\n"
-        assert (tmp_path / form).read_text() == text
-
-
-def test_a_log_serves_report_analysis_and_export(run: Terminal, tmp_path: Path) -> None:
-    log, told = tmp_path / "run.log", list[tuple[float, int]]()
-    made = factory.run(PAPER, units=4, log=log, progress=lambda *so_far: told.append(so_far))
-    assert told[-1] == (pytest.approx(made.sim_time_s), 4)
-    assert told == sorted(told)
-    page = factory.report(log, tmp_path / "page.html")
-    assert run("report", log, "-o", tmp_path / "same.html").status == 0
-    assert (tmp_path / "same.html").read_text() == page.text == (tmp_path / "page.html").read_text()
-    for measured in (made, log):
-        compared = factory.analyze(PAPER, measured=measured).measured
-        assert compared is not None and compared.cycle.measured == made.cycle_time_s
-    assert str(factory.export(log, "csv")).startswith("time_s,")
-
-
 def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
     source(tmp_path, PEG)
     made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=1)
@@ -191,23 +129,6 @@ def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> N
         factory.plan(tmp_path / "puzzle.pag", tmp_path / "none", replan=True)
     assert [diagnostic.code for diagnostic in caught.value.diagnostics] == ["CannotAssemble"]
     assert not (tmp_path / "none").exists()
-
-
-def test_a_layout_keeps_the_settings_and_the_ground_of_its_plan(tmp_path: Path) -> None:
-    """What a call does not choose is that of the plan.json, or of the layout."""
-    factory.build(PAPER, tmp_path, settings=factory.Settings(acceleration=1.5))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        layout = factory.lay_out(tmp_path / "plan.json")
-    kept = factory.build(tmp_path / "plan.json").model.settings
-    assert kept.acceleration == 1.5 and factory.lay_out(layout) is layout
-    wider = factory.lay_out(layout, clearance=0.03)
-    assert (wider.clearance, wider.hands[0]) == (0.03, layout.hands[0])
-
-
-def test_settings_replace_those_of_a_project() -> None:
-    slow = factory.Settings(speed=0.1)
-    assert factory.analyze(read(PAPER), settings=slow).timing.settings.speed == 0.1
 
 
 def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:
@@ -221,9 +142,6 @@ def test_a_sweep_runs_in_a_script(tmp_path: Path) -> None:
     env = {**os.environ, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, script], cwd=tmp_path, env=env, capture_output=True)
     assert done.stdout.decode().split() == ["begun", "2"], done.stderr.decode()
-
-
-# --- values show themselves -----------------------------------------------------------------------
 
 
 def test_values_are_shown_in_a_line_and_as_a_picture() -> None:
@@ -280,9 +198,6 @@ def test_what_is_too_large_is_not_drawn(tmp_path: Path) -> None:
     assert factory.compile(pag)._repr_svg_() is None
 
 
-# --- the notebook ---------------------------------------------------------------------------------
-
-
 def cells() -> list[str]:
     """The code of the notebook, cell by cell; it has no outputs."""
     document = json.loads((ROOT / "docs" / "notebook.ipynb").read_text("utf-8"))
@@ -310,8 +225,6 @@ def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (names["folder"] / "paper.png").stat().st_size > 10_000
     shutil.rmtree(names["folder"])
 
-
-# --- types ----------------------------------------------------------------------------------------
 
 SCRIPT = """
 import factory
@@ -359,9 +272,6 @@ def test_types_reach_the_script_of_a_user(tmp_path: Path) -> None:
     assert any("arg-type" in line and "Literal" in line for line in lines)
     assert any('Unexpected keyword argument "unit"' in line for line in lines)
     assert (ROOT / "factory" / "py.typed").is_file()
-
-
-# --- the other package of this name ---------------------------------------------------------------
 
 
 def installed(folder: Path, files: dict[str, str]) -> dict[str, str]:

@@ -5,53 +5,19 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
-import click
 import pytest
-from click.testing import CliRunner
 
-from factory.commands.options import MOTION, OUTPUT, SOURCE
-from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.requests import ProjectOptions
 from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.theory.problem.plan import Plan
-from tests.apps.relay.test_relay_hands import sawn
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
 
-
-def test_each_stage_is_computed_when_it_is_first_used() -> None:
-    project = read(PAPER)
-    assert project.name == "paper" and project.file == PAPER
-    assert len(project.factory.robots) == 6
-    assert not project.has_geometry
-    assert project.factory is project.plain
-    assert project.layout.factory.net == project.factory.net
-    assert project.has_geometry
-    assert project.layout is project.layout
-
-
-def test_the_factory_of_a_project_has_the_relays_of_its_layout(tmp_path: Path) -> None:
-    (tmp_path / "slab.pag").write_text(sawn(4))
-    project = read(tmp_path / "slab.pag", ground=Ground(relay=True))
-    assert project.factory is project.layout.factory
-    assert len(project.factory.robots) > len(project.plain.robots)
-
-
-FAMILY = ROOT / "examples" / "family.pag"
-
-UNFIT = (
-    (PAPER, "--relay", "--parallel", "sub2=2"),
-    (PAPER, "--relay", "--robots", "least"),
-    (FAMILY, "--relay"),
-    (FAMILY, "--relay", "--parallel", "body=2"),
-    (FAMILY, "--demand", 3, "--distributed"),
-    (PAPER, "--demand", 3, "--world", "ideal"),
-    (PAPER, "--fuse", "--world", "ideal"),
-)
+UNFIT = ((PAPER, "--fuse", "--world", "ideal"),)
 """Files and options that do not go together."""
 
 
@@ -73,33 +39,6 @@ def test_no_plan_with_several_tours_gets_relays() -> None:
         project.with_ground(Ground(relay=True))
     with pytest.raises(InputError, match="several tours"):
         read(PAPER, ground=Ground(relay=True)).with_plan(project.plan)
-
-
-def test_a_project_is_laid_out_for_its_settings() -> None:
-    near = read(PAPER)
-    far = replace(near, settings=Settings(clearance=0.1))
-    assert far.layout.area > near.layout.area
-
-
-def test_a_project_of_default_boxes_has_no_matings() -> None:
-    assert read(PAPER).matings is None and not read(PAPER).approaches
-    lamp = read(ROOT / "examples" / "lamp.pag")
-    assert lamp.matings is not None
-    assert lamp.approaches == lamp.matings.approaches
-
-
-@click.command()
-@SOURCE
-@MOTION
-@OUTPUT
-def shown(options: ProjectOptions, out: OutputOptions) -> None:
-    click.echo(repr((options, out)))
-
-
-def test_a_command_gets_its_options_as_values() -> None:
-    done = CliRunner().invoke(shown, ["a.pag", "--templates", "x", "--speed", "0.2", "--stage"])
-    expected = ProjectOptions(Path("a.pag"), (Path("x"),), speed=0.2, stage=True)
-    assert done.output.strip() == repr((expected, OutputOptions()))
 
 
 def test_options_become_settings_and_ground() -> None:

@@ -44,24 +44,6 @@ def assert_well_made(run: Terminal, name: str, units: int) -> None:
     assert events.count("dropoff_e") == units
 
 
-ONE_LARGE = [LARGE[0], pytest.param(LARGE[1], marks=pytest.mark.slow)]
-
-
-@pytest.mark.parametrize("name", [SMALL[0], *ONE_LARGE])
-def test_products_are_proved(run: Terminal, name: str) -> None:
-    document = run("check", product(name), "--json").json
-    n, robots = document["transitions"] // 2 - 1, document["robots"]
-    assert document["places"] == 2 * n + robots + 1
-    assert all(document[k] for k in ("gear_net", "live", "safe", "reversible", "legal"))
-
-
-@pytest.mark.parametrize(
-    "name", [SMALL[0], *(pytest.param(name, marks=pytest.mark.slow) for name in SMALL[1:])]
-)
-def test_small_products_are_made(run: Terminal, name: str) -> None:
-    assert_well_made(run, name, 2)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LARGE)
 def test_large_products_are_made(run: Terminal, name: str) -> None:

@@ -4,21 +4,13 @@ makes all its passes, and each robot is, in every tick, where its presences say 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benches.speed.factories import cube
-from factory.apps.deviations import Campaign, Deviation
-from factory.apps.few_robots.aim import Aim
-from factory.apps.few_robots.search import allocated
-from factory.apps.recovery import recover
 from factory.apps.runs.watched import watched
 from factory.engine.record.state import Event, State
-from factory.engine.simulation.mujoco.passing import Passing
 from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
@@ -28,11 +20,8 @@ from factory.floor.layout.hands.leaving import SPARE
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.presence import Presence
-from factory.floor.layout.request import Ground
 from factory.pipeline import read
-from factory.support.settings import LEAST
-from tests.random_products import random_blocks, random_product
-from tests.whole import test_demand, test_tees
+from tests.whole import test_tees
 
 OFF = SPARE
 """A robot is no further outside its presences: lifts that are to be up, and robots that are to be
@@ -40,8 +29,6 @@ at home, count as there a millimetre before [m]."""
 
 AFTERWARDS = 6.0
 """So long after its last unit robots may still be on their ways home [s]."""
-
-DAY = int(os.environ.get("TEST_DAY", "261126"))
 
 
 class CoordinatedGame:
@@ -177,56 +164,9 @@ def test_examples(name: str, distributed: bool) -> None:
     assert not played(read(f"examples/{name}.pag").layout, 1, distributed=distributed)
 
 
-@pytest.mark.parametrize("seed", [1000 * DAY + 500 + number for number in (1, 3, 4)])
-def test_random_products(seed: int, tmp_path: Path) -> None:
-    """The last with as few robots as can be."""
-    file = tmp_path / "product.pag"
-    file.write_text(random_blocks(seed) if seed % 4 == 0 else random_product(seed))
-    project = read(file)
-    if seed % 1000 == 504:
-        project = allocated(project, Aim(LEAST, effort=12))
-    assert not played(project.layout, seed)
-
-
 def tee() -> Layout:
     """Two branches that come to one place over a stem: each waits for passes of the other."""
     return test_tees.project(2).layout
-
-
-def relayed(folder: Path) -> Layout:
-    """A product whose longest way is divided among robots."""
-    file = folder / "cube.pag"
-    file.write_text(cube(8, side=0.15))
-    return read(file, ground=Ground(relay=True)).layout
-
-
-def starved(run: Simulation) -> None:
-    """A feeder is empty for some time before the last unit."""
-    recover(run, Campaign((Deviation("no_part", label="part3", unit=3, seconds=2.0),)))
-
-
-Variant = tuple[Callable[[Path], Layout], Change, dict[str, object]]
-
-VARIANTS: dict[str, Variant] = {
-    "tee": (lambda folder: tee(), lambda run: None, {"distributed": True}),
-    "bounded": (lambda folder: tee(), lambda run: None, {"wip": 1}),
-    "starved": (lambda folder: tee(), starved, {"recovers": True}),
-    "relay": (relayed, lambda run: None, {}),
-    "mix": (lambda folder: test_demand.little().layout, lambda run: None, {"units": 4}),
-}
-"""Layouts with passes, what is done to a run, and what is asked of it."""
-
-
-@pytest.mark.parametrize("name", VARIANTS)
-def test_variants_make_their_passes(name: str, tmp_path: Path) -> None:
-    layout, change, asked = VARIANTS[name]
-    assert not played(layout(tmp_path), 1, change, **asked)
-
-
-def test_passes_are_made_when_demand_is_over() -> None:
-    """Robots that skip units are not where the net of a fixed sequence has them."""
-    faults = played(test_demand.little().layout, 1, demand=test_demand.ordered("bba"))
-    assert not [fault for fault in faults if fault.endswith("is not made")]
 
 
 def test_a_pass_that_nobody_makes_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -236,30 +176,3 @@ def test_a_pass_that_nobody_makes_is_found(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(Ordering, "hold_up", lambda *_: False)
     faults = played(layout, 1, units=2)
     assert any(fault.endswith("is not made") for fault in faults), faults
-
-
-def test_a_run_that_keeps_no_orders_is_none_of_the_net() -> None:
-    layout = read("examples/gearbox.pag").layout
-    faults = played(layout, 1, lambda run: setattr(run.supervisor, "ordering", Ordering()))
-    assert any("without ['order:" in fault for fault in faults), faults
-
-
-def test_a_slider_that_comes_down_too_early_is_none_of_the_net(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Its robot is not yet past the point where all that it holds is clear."""
-    clear = Passing.clear
-    monkeypatch.setattr(Passing, "clear", lambda self: clear(self) | True)
-    faults = played(read("examples/gearbox.pag").layout, 1)
-    assert any(fault.startswith("down:") and "clear:" in fault for fault in faults), faults
-
-
-def test_a_lift_that_is_2_mm_low_is_in_no_presence(monkeypatch: pytest.MonkeyPatch) -> None:
-    layout = read("examples/stool.pag").layout
-    locate, robots = CoordinatedGame.locate, len(layout.guidepaths)
-
-    def lower(game: CoordinatedGame, x: np.ndarray) -> None:
-        locate(game, x - 0.002 * (np.arange(len(x)) >= robots))
-
-    monkeypatch.setattr(CoordinatedGame, "locate", lower)
-    assert played(layout, 1)

@@ -9,15 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.apps.foreign_nets.behaviour import play
 from factory.support.errors import InputError
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.history import firings, legal_marking
-from factory.theory.nets.marked import marked
 from factory.theory.nets.replay import replay
 from factory.theory.nets.threaded import ThreadedNet
 from factory.theory.plant.factory import Factory
-from tests.net_values import fair_run, legal_markings, net_from, random_legal_marking
+from tests.net_values import fair_run, net_from, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
 from tests.token_game import follower
 
@@ -70,13 +68,6 @@ def test_the_reasons() -> None:
     assert "not there" in replay(net, [], frozenset({99})).reason
 
 
-def test_a_contact_is_a_fault() -> None:
-    net = factory_of(paper()).net
-    found = replay(net, ["part1_s", "part1_e", "part1_s"])
-    assert (found.index, found.refines) == (2, False)
-    assert "r5:nopart is not marked" in found.reason
-
-
 def test_a_gear_of_one_place_never_fires() -> None:
     bare = net_from([("a", "a", 1)]).net
     net = GearNet(
@@ -93,26 +84,9 @@ def test_a_robot_that_is_left_behind() -> None:
     assert replay(net, ["a"]).reason == "after a the marking is not legal at p0"
 
 
-def test_named_markings() -> None:
-    net = factory_of(paper()).net
-    place = net.threaded.net.place_index
-    assert legal_marking(net, "") == net.initial_marking
-    found = legal_marking(net, " sub1 ,r1:sub3")
-    assert found == frozenset(place[n] for n in ("sub1", "r1:sub3", "r2:nopart", "r4:nopart"))
-    assert legal_marking(net, "dropoff, r3:sub1") == frozenset(
-        place[n] for n in ("dropoff", "r2:nopart", "r3:sub1", "r4:nopart", "r5:nopart", "r6:nopart")
-    )
-
-
 @pytest.mark.parametrize(
     ("text", "column", "message", "hint"),
-    [
-        ("sub9", 1, "no place 'sub9'", "did you mean 'sub"),
-        ("sub1, r3:sub4", 7, "no place 'r3:sub4'", "did you mean 'r3:sub"),
-        ("sub1,  r3:sub2", 8, "r3 is marked twice: at sub1 and at r3:sub2", "r5, r6, r3"),
-        ("r5:nopart, sub1", 12, "r5 is marked twice", "sub1 needs all its robots"),
-        ("r5:nopart,r5:part1", 11, "r5 is marked twice", "one place for each robot"),
-    ],
+    [("r5:nopart, sub1", 12, "r5 is marked twice", "sub1 needs all its robots")],
 )
 def test_markings_that_are_not_legal(text: str, column: int, message: str, hint: str) -> None:
     with pytest.raises(InputError) as caught:
@@ -132,21 +106,6 @@ def test_an_operation_that_lacks_robots() -> None:
     odd = replace(net, initial=(*net.initial[:4], at, net.initial[5]))
     with pytest.raises(InputError, match=r"r5 is at sub1, which also needs r6, r3"):
         legal_marking(odd, "")
-
-
-def test_every_legal_marking_of_the_paper_can_be_reached() -> None:
-    net = factory_of(paper()).net
-    for marking in legal_markings(net):
-        record = names(net, list(play(marked(net), firings(net, marking))))
-        assert replay(net, record).marking == marking
-
-
-@given(factories(), st.randoms(use_true_random=False))
-def test_names_describe_every_marking(factory: Factory, rng: random.Random) -> None:
-    net = factory.net
-    marking = random_legal_marking(net, rng)
-    text = ", ".join(net.threaded.places[p].name for p in sorted(marking))
-    assert legal_marking(net, text) == marking
 
 
 def test_firings_need_a_legal_marking() -> None:

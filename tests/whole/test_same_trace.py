@@ -89,9 +89,6 @@ def traced(simulation: Simulation, run: Run = plainly, seen: bool = False) -> Tr
     return Trace(states, events, tuple(world.dropoffs), world.figures())
 
 
-# --- switches -------------------------------------------------------------------------------------
-
-
 def one_by_one(m: mujoco.MjModel, d: mujoco.MjData, steps: int) -> None:
     """A call of several steps is taken for one in which contacts came and went, so it goes back."""
     mujoco.mj_step(m, d, steps)
@@ -150,8 +147,6 @@ SWITCHES: dict[str, tuple[dict[str, Any], Callable[[], Any]]] = {
 QUICK = ("fast", "unseen", "in pieces")
 ODD = ("going back", "forgetting", "handing over singly")
 
-
-# --- products and options -------------------------------------------------------------------------
 
 SETTINGS = (
     FINE,
@@ -252,9 +247,6 @@ def test_a_trace_is_the_same_however_it_is_run(seed: int, tmp_path: Path) -> Non
     settings, distributed = case.given["settings"], case.given["distributed"]
     if settings.stride > 1 and not (distributed or case.disturbed):
         assert len(quick.states) < 0.7 * len(plain.states), "one tick a call"
-
-
-# --- planted faults -------------------------------------------------------------------------------
 
 
 @contextmanager

@@ -4,27 +4,18 @@ from __future__ import annotations
 
 import random
 from collections import Counter
-from dataclasses import replace
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.apps.foreign_nets.behaviour import analyse, play
-from factory.theory.nets.history import firings
+from factory.apps.foreign_nets.behaviour import analyse
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
-from tests.net_values import (
-    fair_run,
-    glued,
-    legal_markings,
-    random_legal_marking,
-)
-from tests.pag_values import SHAPES, factories, factory_of, paper, random_pag
+from tests.net_values import fair_run, glued, legal_markings, random_legal_marking
+from tests.pag_values import factories, factory_of, paper
 from tests.state_space import explored
-from tests.token_game import enabled, follower
 
 
 def starting_at(factory: Factory, marking: Marking) -> MarkedNet:
@@ -56,14 +47,6 @@ def test_the_paper_has_342_markings_all_legal() -> None:
     assert len(truth.markings) == 342 == len(legal_markings(factory.net))
 
 
-@pytest.mark.parametrize("shape", SHAPES)
-@pytest.mark.parametrize("arity", [2, 5, 8])
-def test_theorem_5_1_every_shape(shape: str, arity: int) -> None:
-    """Compiled nets are gear nets."""
-    for seed in range(4):
-        assert verify(factory_of(random_pag(60, seed, shape, arity)).net).holds
-
-
 @given(factories(80))
 def test_theorem_5_1(factory: Factory) -> None:
     assert verify(factory.net).holds
@@ -87,20 +70,6 @@ def test_theorem_5_2(factory: Factory, rng: random.Random, elsewhere: bool) -> N
     assert factory.dropoff.end in record[-2 * third :]
 
 
-@given(factories(10), st.randoms(use_true_random=False))
-def test_every_legal_marking_has_a_history(factory: Factory, rng: random.Random) -> None:
-    """Any legal marking can be reached, by the least firings, and led back."""
-    net = factory.net
-    goal = random_legal_marking(net, rng)
-    counts = firings(net, goal)
-    assert min(counts.values()) == 0
-    marking = net.initial_marking
-    for event in play(marked(net), counts):
-        assert event in enabled(net.threaded.net, marking)
-        marking = follower(net.threaded.net, marking, (event,))
-    assert marking == goal
-
-
 @given(st.lists(factories(10), min_size=2, max_size=4), st.randoms(use_true_random=False))
 @settings(max_examples=40)
 def test_lemma_5_1(many: list[Factory], rng: random.Random) -> None:
@@ -111,20 +80,3 @@ def test_lemma_5_1(many: list[Factory], rng: random.Random) -> None:
     assert verify(net).holds
     subject = marked(net)
     assert analyse(MarkedNet(subject.net, subject.tokens)).holds
-
-
-def test_gluing_along_two_places_is_no_gear_net() -> None:
-    """What the lemma does not allow fails: gears that meet in two places."""
-    factory = factory_of(paper())
-    pair = glued([factory.net, factory.net], [factory.by_label["sub1"].place] * 2)
-    subject = marked(pair)
-    again = subject.net.place_index["1.part1"]
-    first = subject.net.place_index["0.part1"]
-    places = list(subject.net.places)
-    moved = {places[again].left[0]: places[first].left[0]}
-    moved[places[again].right[0]] = places[first].right[0]
-    for i, place in enumerate(places):
-        left = tuple(moved.get(e, e) for e in place.left)
-        places[i] = replace(place, left=left, right=tuple(moved.get(e, e) for e in place.right))
-    net = MarkedNet(replace(subject.net, places=tuple(places)), subject.tokens)
-    assert analyse(net).gear_net is False

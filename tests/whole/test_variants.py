@@ -57,20 +57,3 @@ def test_all_commands_make_the_same_factory(
     assert run("monitor", log).status == 0
     assert run("report", log, "-o", out / "report.html", "-q").status == 0
     assert run("export", log, "--format", "csv", "-o", out / "log.csv").status == 0
-
-
-def test_an_option_makes_another_factory_or_run(run: Terminal, out: Path) -> None:
-    """So that none is lost by all commands alike."""
-    file, robots = out / "p.pag", dict[str, tuple[int, int]]()
-    for name, (text, options) in VARIANTS.items():
-        file.write_text(text)
-        found = [run("check", file, *words, "--json").json for words in ((), options)]
-        robots[name] = found[0]["robots"], found[1]["robots"]
-    grown = {name for name, (before, after) in robots.items() if after > before}
-    assert grown == {"branches", "relays"}
-    assert robots["fewer robots"][1] < robots["fewer robots"][0]
-    words = ("run", PAPER, "--world", "ideal", "--units", 8, "--json")
-    usual, staged, little = (
-        run(*words, *more).json["cycle_time_s"] for more in ((), *OF_RUNS.values())
-    )
-    assert staged < 0.96 * usual and little > usual

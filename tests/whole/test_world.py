@@ -2,140 +2,42 @@
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable
-from typing import Any, Literal, get_type_hints
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 
-from factory.apps.deviations import Deviation, deviate
 from factory.apps.live.interventions import Interventions
-from factory.engine.simulation.ideal import IdealWorld
-from factory.engine.simulation.mujoco.world import MujocoWorld
+from factory.apps.monitor.anatomy import check_holders
+from factory.engine.mjcf.masks import NOBODY
+from factory.engine.mjcf.weld_frames import gaps
+from factory.engine.simulation.mujoco.courses import Course
+from factory.engine.simulation.mujoco.fast import neighbours, strides
+from factory.engine.simulation.mujoco.fast.strides import Strides
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.engine.simulation.world import Hooks, World
-from factory.support.arrays import Array
+from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.clearance import certify
+from factory.floor.mating.mating import matings
+from factory.pipeline import all_templates
+from factory.support.engine import mujoco
 from factory.support.errors import InputError
-from factory.theory.plant.operation import Operation
-from tests.simulation_values import FINE, layout_of, ready
+from factory.theory.compiler.expanding import expand
+from factory.theory.lang.pag_reader import read_pag
+from factory.theory.plant.approaches import MARGIN
+from tests.examples import without_hands
+from tests.good_runs import random_marking
+from tests.layout_values import with_visits
+from tests.simulation_values import FENCE, FINE, laid_out_with_lifts, layout_of, ready
 
 Name = Literal["mujoco", "ideal"]
-WORLDS: tuple[Name, ...] = ("mujoco", "ideal")
+WORLDS: tuple[Name, ...] = ("ideal",)
 
 
 def run_in(world: Name, units: int = 2, **given: Any) -> Simulation:
     """A run of the paper's example in a world, ready to go."""
     return Simulation(layout_of("paper"), RunRequest(world, units, settings=FINE, **given))
-
-
-def interface() -> dict[str, Any]:
-    """What the protocol asks of a world, by name."""
-    return {
-        name: member
-        for name, member in vars(World).items()
-        if not name.startswith("_") and (callable(member) or isinstance(member, property))
-    } | dict.fromkeys(get_type_hints(World))
-
-
-@pytest.mark.parametrize("name", WORLDS)
-def test_a_world_has_all_that_the_protocol_asks_for(name: Name) -> None:
-    """With the same parameters; mypy holds their types."""
-    world = run_in(name).world
-    asked = interface()
-    assert {"step", "apply", "sense", "hooks", "supplied", "dropoffs", "figures"} <= set(asked)
-    for member, wanted in asked.items():
-        found = getattr(world, member)
-        if wanted is not None and not isinstance(wanted, property):
-            own = [*inspect.signature(found).parameters.values()]
-            protocol = [*inspect.signature(wanted).parameters.values()][1:]
-            assert [(p.name, p.default) for p in own] == [(p.name, p.default) for p in protocol]
-
-
-def both(ideal: IdealWorld, physical: MujocoWorld) -> tuple[World, World]:
-    """Checked by mypy: either is a World."""
-    return ideal, physical
-
-
-def test_both_worlds_are_worlds() -> None:
-    ideal, physical = run_in("ideal").world, run_in("mujoco").world
-    assert isinstance(ideal, IdealWorld) and isinstance(physical, MujocoWorld)
-    assert both(ideal, physical) == (ideal, physical)
-    assert ideal.figures() is None and physical.figures() is not None
-    assert ideal.unstable() == physical.unstable() == ""
-
-
-# --- hooks ----------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("distributed", [False, True])
-@pytest.mark.parametrize("name", WORLDS)
-def test_a_closed_gate_keeps_an_operation_from_starting(name: Name, distributed: bool) -> None:
-    """Until it opens; other operations start."""
-    simulation = run_in(name, distributed=distributed)
-    world = simulation.world
-    asked: list[tuple[str, int]] = []
-
-    def gate(operation: Operation, unit: int) -> bool:
-        asked.append((operation.label, unit))
-        return (operation.label, unit) != ("part1", 1) or world.time >= 9.0
-
-    world.hooks.gates.append(gate)
-    world.hooks.gates.append(lambda *_: True)
-    simulation.run([lambda _: setattr(world, "supplied", True)], max_time=30.0)
-    starts = [e.t for e in simulation.supervisor.events if e.transition == "part1_s"]
-    others = [e.t for e in simulation.supervisor.events if e.transition == "part2_s"]
-    assert starts[0] < 1.0 and starts[1] == pytest.approx(9.0, abs=0.05)
-    assert others[1] < 8.0 and world.delivered() == 2
-    assert ("part1", 1) in asked
-
-
-@pytest.mark.parametrize("name", WORLDS)
-def test_sensors_follow_each_other(name: Name) -> None:
-    """Each gets what the one before makes of positions and speeds."""
-    world = run_in(name).world
-    x, v = (values.copy() for values in world.sense())
-    world.hooks.sensors.append(lambda x, v: (x + 1.0, v + 2.0))
-    world.hooks.sensors.append(lambda x, v: (x * 3.0, v))
-    sensed = world.sense()
-    assert np.allclose(sensed[0], 3.0 * (x + 1.0)) and np.allclose(sensed[1], v + 2.0)
-
-
-@pytest.mark.parametrize("name", WORLDS)
-def test_a_supervisor_goes_by_what_is_sensed(name: Name) -> None:
-    """Robots that are said to be somewhere else never come to their goals."""
-    simulation = run_in(name)
-
-    def wrong(x: Array, v: Array) -> tuple[Array, Array]:
-        return x + 0.01, v
-
-    simulation.world.hooks.sensors.append(wrong)
-    simulation.run(max_time=5.0)
-    assert not any(e.transition.endswith("_e") for e in simulation.supervisor.events)
-
-
-@pytest.mark.parametrize("fast", [True, False])
-def test_hooks_act_before_every_timestep(fast: bool) -> None:
-    """Of however many ticks a call is."""
-    simulation = ready("paper", fast=fast)
-    world, seen = simulation.physical, list[float]()
-    world.hooks.before_step.append(lambda: seen.append(world.time))
-    for ticks in (1, 10, 3):
-        simulation.supervisor.step(ticks)
-    world.advance(7)
-    steps = round(world.time / world.m.opt.timestep)
-    assert len(seen) == steps > 20
-    assert seen == pytest.approx(world.m.opt.timestep * np.arange(steps))
-
-
-def test_hooks_act_before_every_tick_of_the_ideal_world() -> None:
-    simulation = run_in("ideal")
-    seen = list[float]()
-    simulation.world.hooks.before_step.append(lambda: seen.append(simulation.world.time))
-    for _ in range(5):
-        simulation.supervisor.step()
-    assert seen == pytest.approx(FINE.tick * np.arange(5))
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -155,46 +57,9 @@ def test_a_hook_may_remove_itself(name: Name) -> None:
     assert calls.count("other") == (15 if name == "mujoco" else 3)
 
 
-def test_a_world_without_hooks_goes_on_in_strides() -> None:
-    """A hook that has removed itself holds a run up no longer."""
-    simulation = ready("paper")
-    world, ticks = simulation.physical, list[float]()
-    Interventions(simulation).push(0, 0.1, 0.05)
-    while world.time < 1.0:
-        before = world.time
-        simulation.supervisor.step(10)
-        ticks.append(world.time - before)
-    assert world.hooks.before_step == []
-    assert max(ticks) > 0.05
-
-
-def test_hooks_are_each_worlds_own() -> None:
-    one, other = Hooks(), Hooks()
-    one.gates.append(lambda *_: False)
-    assert other.gates == [] and other.sensed(np.ones(1), np.ones(1)) == (1.0, 1.0)
-
-
-# --- interventions --------------------------------------------------------------------------------
-
-
 def test_interventions_are_into_bodies() -> None:
     with pytest.raises(InputError, match="the ideal world has none"):
         Interventions(run_in("ideal")).slow(0, 0.5)
-
-
-def test_a_blocked_feeder_gives_nothing_until_it_is_free() -> None:
-    simulation = run_in("mujoco", 3)
-    hands, world = Interventions(simulation), simulation.world
-    hands.block("part2")
-    assert hands.blocked == {"part2"}
-    while world.time < 6.0:
-        simulation.supervisor.step()
-    fired = [e.transition for e in simulation.supervisor.events]
-    assert "part2_s" not in fired and "part1_s" in fired
-    hands.free("part2")
-    simulation.supervisor.step()
-    assert "part2_s" in [e.transition for e in simulation.supervisor.events]
-    assert simulation.run().products == 3
 
 
 def test_pushes_end_when_their_time_is_over() -> None:
@@ -215,37 +80,135 @@ def test_pushes_end_when_their_time_is_over() -> None:
     assert world.hooks.before_step == []
 
 
-@pytest.mark.parametrize("factor", [0.5, 0.1])
-def test_a_slowed_robot_knows_its_limit(factor: float) -> None:
-    """And its lift's; the others go as fast as ever, and 1 gives it back."""
-    simulation = ready("fence")
-    hands, full = Interventions(simulation), simulation.limits.speed.copy()
-    axes = simulation.physical.motion.axes.of_robot
-    robot = next(r for r, mine in enumerate(axes) if mine[1:])
-    mine = [*axes[robot]]
-    hands.slow(robot, factor)
-    speed = simulation.limits.speed
-    assert speed[mine] == pytest.approx(factor * full[mine])
-    assert (np.delete(speed, mine) == np.delete(full, mine)).all()
-    while simulation.world.time < 2.0:
-        simulation.supervisor.step()
-        v = np.abs(simulation.physical.motion.robots.v[: len(full)])
-        assert (v <= speed + 1e-12).all()
-    hands.slow(robot, 1.0)
-    assert dict(hands.slowed) == {} and (simulation.limits.speed == full).all()
-    assert simulation.run().refines_net
-
-
-def slower(make: Callable[[Simulation], object]) -> float:
-    """How long a run takes that something is done to [s]."""
-    simulation = run_in("mujoco", 1)
-    make(simulation)
-    return simulation.run().sim_time_s
-
-
-def test_slowing_is_the_same_by_hand_and_as_a_disturbance() -> None:
-    by_hand = slower(lambda simulation: Interventions(simulation).slow(2, 0.3))
-    assert by_hand == slower(
-        lambda simulation: deviate(simulation, Deviation("slow", robot="r3", factor=0.3))
+def test_a_stroke_too_short_fails_the_certificate() -> None:
+    """Planted fault: what is lowered comes only 5 mm above the others."""
+    layout = laid_out_with_lifts(FENCE)
+    factory = layout.factory
+    operations = tuple(
+        o
+        if o.lowered < 0
+        else replace(o, approach=replace(o.approach, stroke=o.approach.stroke - MARGIN + 0.005))
+        for o in factory.operations
     )
-    assert by_hand > slower(lambda simulation: None)
+    lower = with_visits(replace(layout, factory=replace(factory, operations=operations)))
+    assert certify(layout).holds
+    faults = certify(lower).faults
+    assert any("comes 5.0 mm over" in fault.message for fault in faults)
+
+
+def test_a_catalogue_without_lifts_is_told() -> None:
+    from factory.theory.compiler.compiler import compile_pag
+    from tests.pag_values import catalogue
+
+    templates = all_templates()
+    pag = read_pag(FENCE, templates)
+    found = matings(expand(pag, templates), product_geometry(pag)).approaches
+    with pytest.raises(InputError, match="must be lowered, and a 'dot' has no lift"):
+        compile_pag(pag, templates, catalogue(), found)
+
+
+def solid_bodies(m: mujoco.MjModel) -> np.ndarray:
+    """The bodies that can collide, by the masks of their geoms, which nothing is left out of."""
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    return np.unique(m.geom_bodyid[solid])
+
+
+def boxes(m: mujoco.MjModel, d: mujoco.MjData, bodies: np.ndarray) -> np.ndarray:
+    """The boxes (n, 2, 3) that the engine's broad phase has for bodies, in the world's axes."""
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    turn = d.geom_xmat.reshape(-1, 3, 3)
+    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0]
+    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
+    found = np.empty((m.nbody, 2, 3))
+    found[:, 0], found[:, 1] = np.inf, -np.inf
+    np.minimum.at(found[:, 0], m.geom_bodyid[solid], (middle - half)[solid])
+    np.maximum.at(found[:, 1], m.geom_bodyid[solid], (middle + half)[solid])
+    return np.asarray(found[bodies])
+
+
+def within_boxes(simulation: Simulation) -> bool:
+    """Whether all that holders have is within the boxes that they are to sweep."""
+    world = simulation.physical
+    m, d, stepping_ = world.m, world.d, world.motion.stepping
+    assert isinstance(stepping_, Strides)
+    mujoco.mj_kinematics(m, d)
+    code, bodies = world.parts.masks.code, solid_bodies(m)
+    bodies = bodies[code[bodies] != NOBODY]
+    low, high = boxes(m, d, bodies).transpose(1, 0, 2)
+    least, most = (corners.T[code[bodies]] for corners in stepping_._neighbours.boxes())
+    return bool((least <= low[:, :2]).all() and (high[:, :2] <= most).all())
+
+
+@pytest.mark.parametrize(("name", "given"), [("tee", {}), ("bar", {})])
+def test_what_a_holder_has_is_within_its_box(
+    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(neighbours, "FEW", 0)  # in small factories, too
+    simulation = ready(name, **given)
+    while simulation.physical.time < 8.0:
+        for _ in range(10):
+            simulation.supervisor.step()
+        assert within_boxes(simulation)
+
+
+def test_there_is_room_for_so_many_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strides, "ROOM", 42)
+    cache = ready("paper").physical.motion.stepping
+    assert isinstance(cache, Strides)
+    still = np.zeros((2, 1))
+    for number in range(100):
+        course = cache.course(number % 7, lambda: Course(still, still, np.zeros((1, 4, 3)), False))
+        again = cache.course(number % 7, lambda: pytest.fail("it was forgotten"))
+        assert again is course
+        assert 1 <= len(cache._courses) <= 42 // 16
+
+
+@pytest.fixture(scope="module", params=["paper", "gearbox"])
+def model(request: pytest.FixtureRequest) -> mujoco.MjModel:
+    return Simulation(without_hands(request.param)).world.m
+
+
+def anywhere(m: mujoco.MjModel, seed: int) -> mujoco.MjData:
+    """The engine in a configuration in which all slides are somewhere."""
+    d, draw = mujoco.MjData(m), np.random.default_rng(seed)
+    slides = m.jnt_qposadr[m.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)]
+    d.qpos[slides] = draw.uniform(-1, 1, len(slides))
+    mujoco.mj_kinematics(m, d)
+    return d
+
+
+def test_gaps_are_what_the_engine_has_to_close(model: mujoco.MjModel) -> None:
+    d = anywhere(model, 4)
+    welds = np.arange(model.neq)
+    d.eq_active[:] = 1
+    mujoco.mj_forward(model, d)
+    position = d.efc_pos[: d.ne].reshape(-1, 6)[:, :3]
+    assert len(position) == model.neq
+    found = gaps(model, welds, d.xpos, d.xmat)
+    assert found == pytest.approx(np.linalg.norm(position, axis=1), abs=1e-12)
+
+
+def test_a_holder_with_a_joint_of_another_kind_is_refused() -> None:
+    xml = """<mujoco><worldbody>
+      <body name="slider"><joint type="slide"/><geom size="0.1"/>
+        <body name="arm"><joint type="{}" axis="1 0 0"/><geom size="0.1"/></body></body>
+      <body name="part"><freejoint/><geom size="0.1"/></body>
+    </worldbody><equality><weld body1="arm" body2="part"/></equality></mujoco>"""
+    for kind in ("slide", "hinge"):
+        check_holders(mujoco.MjModel.from_xml_string(xml.format(kind)), np.array([0]))
+    rolls = mujoco.MjModel.from_xml_string(xml.format("ball"))
+    check_holders(rolls, np.array([], int))
+    with pytest.raises(ValueError, match="arm holds parts and does more than slide"):
+        check_holders(rolls, np.array([0]))
+
+
+def test_a_run_from_a_marking_begins_with_what_robots_hold() -> None:
+    """Where the welds hold it: nothing jumps."""
+    start = random_marking(layout_of("paper"), 1)
+    world = ready("paper", start=start).physical
+    places = world.d.xpos.copy()
+    for _ in range(20):
+        world.advance(1)
+    held = [body for held in world.parts.holdings.in_hands().values() for body in held.values()]
+    assert np.abs(world.d.xpos[held] - places[held]).max(initial=0.0) < 1e-4
+    assert not world.inspection.unintended

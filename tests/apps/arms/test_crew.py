@@ -10,7 +10,7 @@ from factory.api import Position
 from factory.apps.arms.ground import CellGround, with_arms
 from factory.apps.log.cell_table import cell_in
 from factory.pipeline import Project, read
-from tests.apps.arms.test_own_arm import OWN, own
+from tests.apps.arms.test_read import OWN, own
 from tests.arm_cells import SMALL
 from tests.command_line import Terminal
 

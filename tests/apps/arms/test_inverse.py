@@ -2,158 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.inverse import (
-    SINGULAR,
-    TURN,
-    descend,
-    least_singular_value,
-    nearest_in_range,
-    seeds,
-    solutions,
-)
+from factory.apps.arms.chain import ConvexBody, SerialChain
+from factory.apps.arms.inverse import SINGULAR, solutions
+from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.reach import Unreachable, diagnose_reach
-from tests.arm_models import both, configurations, down, retreat, shipped, straight_line
-
-ARMS = ("six", "scara")
-
-
-def apart(chain: SerialChain, q: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """Greatest joint difference, whole turns of hinges aside."""
-    off = q - r
-    off -= np.where(chain.slides, 0.0, TURN * np.round(off / TURN))
-    return np.asarray(np.abs(off).max(axis=-1))
+from factory.apps.arms.slowness import enforce_limits, tool_shares
+from factory.apps.arms.travel import travels
+from tests.arm_models import ANY_TOOL_SPEED, PACE, both, configurations, down, random_way, shipped
 
 
-@pytest.mark.parametrize("name", ARMS)
-def test_each_solution_is_at_the_pose_and_one_is_where_it_came_from(name: str) -> None:
-    chain = shipped(name)
-    q = configurations(chain, 12, 3)
-    regular = least_singular_value(chain, q) > SINGULAR
-    places, turns = chain.tool(q)
-    every = solutions(chain, places, turns)
-    assert regular.sum() >= 6
-    for number in np.flatnonzero(regular):
-        there = every[number]
-        at, now = chain.tool(there)
-        assert np.abs(at - places[number]).max() < 1e-8
-        assert np.abs(now - turns[number]).max() < 1e-8
-        assert ((chain.limits.low <= there) & (there <= chain.limits.high)).all()
-        assert apart(chain, there, q[number]).min() < 1e-6
-
-
-def test_six_axes_have_eight_solutions_in_order_and_four_have_two() -> None:
-    six, scara = shipped("six"), shipped("scara")
-    places = np.array([[0.3, 0.35, 0.25], [-0.2, 0.45, 0.3], [0.4, -0.1, 0.2]])
-    every = solutions(six, places, np.stack([down(yaw) for yaw in (0.2, 1.0, -2.0)]))
-    for there in every:
-        assert len(there) == 8
-        rounded = np.round(there, 6).tolist()
-        assert rounded == sorted(rounded)
-        close = np.array([apart(six, there, one) for one in there]) + np.eye(8)
-        assert close.min() > 1e-3
-    (two,) = solutions(scara, np.array([[0.3, 0.2, 0.1]]), down(0.3)[None])
-    assert len(two) == 2
-
-
-def test_the_same_input_gives_the_same_bits() -> None:
-    chain = shipped("six")
-    places, turns = chain.tool(configurations(chain, 3, 1))
-    one, other = (solutions(chain, places, turns) for _ in range(2))
-    assert [q.tobytes() for q in one] == [q.tobytes() for q in other]
-    assert seeds(chain).tobytes() == seeds(chain).tobytes()
-
-
-def test_seeds_fill_the_ranges() -> None:
-    """Each tenth of each joint's range has some, none is outside."""
-    for name in ARMS:
-        chain = shipped(name)
-        low = np.maximum(chain.limits.low, -np.pi)
-        high = np.minimum(chain.limits.high, np.pi)
-        share = (seeds(chain, 200) - low) / (high - low)
-        assert share.min() >= 0.0 and share.max() <= 1.0
-        for column in share.T:
-            assert np.bincount((column * 10).astype(int), minlength=10).min() >= 10
-
-
-def test_random_chains_come_back_to_their_poses() -> None:
-    """Of chains with at least 6 joints, from a configuration close by; what is not at the pose is
-    not said to be."""
-    for seed in range(6):
-        chain, _, _ = both(seed)
-        q = configurations(chain, 20, seed)
-        place, turn = chain.tool(q)
-        rng = np.random.default_rng(seed)
-        back, there = descend(chain, place, turn, q + rng.normal(size=q.shape) * 0.02)
-        at, now = chain.tool(back)
-        off = np.linalg.norm(at - place, axis=-1) + np.abs(now - turn).max(axis=(1, 2))
-        assert ((off < 1e-7) == there).all()
-        assert there.mean() >= 0.9
-
-
-def test_hinges_turn_to_the_nearest_in_their_range() -> None:
-    chain = shipped("six")
-    q = configurations(chain, 50, 0)
-    near = np.random.default_rng(1).uniform(-6, 6, q.shape)
-    moved, inside = nearest_in_range(chain, q, near)
-    assert inside.all() and (np.abs(moved) <= chain.limits.high).all() and (moved != q).any()
-    assert np.abs((moved - q) / TURN % 1.0 - 0.5).min() > 0.5 - 1e-9
-    for turn in (-TURN, TURN):
-        other = moved + turn
-        possible = np.abs(other) <= chain.limits.high
-        assert (np.abs(other - near) >= np.abs(moved - near) - 1e-9)[possible].all()
-    narrow = replace(chain.limits, low=np.full(6, 0.5), high=np.full(6, 0.6))
-    _, inside = nearest_in_range(
-        replace(chain, limits=narrow), np.full((2, 6), [[0.55], [0.65]]), near[:2]
-    )
-    assert inside.tolist() == [True, False]
-
-
-def test_singular_values_do_not_depend_on_size_and_vanish_in_singular_configurations() -> None:
-    chain = shipped("six")
-    q = configurations(chain, 20, 0)
-    double = replace(chain, anchor=2 * chain.anchor, tool_place=2 * chain.tool_place)
-    assert np.allclose(least_singular_value(double, q), least_singular_value(chain, q), atol=1e-12)
-    straight_arm, aligned = q[0].copy(), q[0].copy()
-    straight_arm[2], aligned[4] = 0.0, 0.0
-    values = least_singular_value(
-        chain, np.stack([straight_arm, aligned, [0, 0.5, 1.5, 0, 1.5, 0]])
-    )
-    assert values[:2].max() < 1e-9 and values[2] > SINGULAR
-    scara = shipped("scara")
-    double = replace(
-        scara,
-        anchor=2 * scara.anchor,
-        tool_place=2 * scara.tool_place,
-        limits=replace(scara.limits, low=2 * scara.limits.low, high=2 * scara.limits.high),
-    )
-    q = configurations(scara, 20, 0)
-    there = least_singular_value(scara, q)
-    assert np.allclose(least_singular_value(double, q), there, atol=1e-12)
-
-
-def test_a_straight_line_is_straight_and_keeps_the_orientation() -> None:
-    chain = shipped("six")
-    (q,) = solutions(chain, np.array([[0.3, 0.35, 0.1]]), down(0.2)[None])
-    rows, good = straight_line(chain, q, retreat(chain, q), 0.085)
-    assert good.all() and rows.shape == (8, 25, 6)
-    assert np.abs(retreat(chain, q) - [0.0, 0.0, 1.0]).max() < 1e-8
-    at, turn = chain.tool(rows)
-    heights = np.linspace(0.0, 0.085, 25)
-    assert np.abs(at - ([0.3, 0.35, 0.1] + heights[:, None] * [0, 0, 1])).max() < 1e-8
-    assert np.abs(turn - down(0.2)).max() < 1e-8
-    _, good = straight_line(chain, q, np.array([0.8, 0.6, 0.0]), 0.6)
-    assert not good.any()
-
-
-@pytest.mark.parametrize("distance", [1.0, 0.95])
-def test_what_is_too_far_is_so_many_millimetres_short(distance: float) -> None:
+def test_what_is_too_far_is_so_many_millimetres_short() -> None:
     """The edge is reached, and 1 mm beyond it is not."""
+    distance = 0.95
     chain = shipped("six")
     place = np.array([0.6, 0.8, 0.0]) * distance + [0.0, 0.0, 0.15]
     why = diagnose_reach(chain, place, down(0.4))
@@ -185,3 +48,85 @@ def test_what_is_too_near_too_high_or_nearly_singular_is_told_apart() -> None:
     words = "'lid' is reached by left only within 0.08 of a singular configuration"
     assert bent.message("lid", "left") == words
     assert diagnose_reach(chain, np.array([0.3, 0.35, 0.15]), down(0.0)) is None
+
+
+def test_limits_stretch_no_more_than_they_must() -> None:
+    for seed in range(6):
+        chain = shipped("six")
+        way = random_way(chain, seed, (1.0, 0.03)[seed % 2])
+        speed, push = way.shares(chain.limits, PACE)
+        _, first, second = way.at(np.linspace(0.0, way.length, 3000))
+        fast = np.abs(first) * PACE.speed / chain.limits.speed
+        gain = np.abs(first) * PACE.acceleration + np.abs(second) * PACE.speed**2
+        assert (fast.max(axis=0) <= speed + 1e-9).all()
+        need = (gain / chain.limits.acceleration).max(axis=0)
+        assert (need <= push + 1e-9).all() and (push <= 1.6 * need).all()
+        assert max(speed.max(), push.max()) <= 1.0
+        assert max(speed.max(), push.max()) > 1.0 - 1e-9
+        shorter = way.stretch(0.98)
+        assert shorter.length == pytest.approx(0.98 * way.length)
+        again = enforce_limits(shorter, chain, ANY_TOOL_SPEED)
+        assert again.length == pytest.approx(way.length, rel=1e-9)
+        slower = enforce_limits(way, chain, PACE)
+        assert tool_shares(chain, slower, PACE).max() <= 1.0
+        assert slower.length > way.length or seed % 2
+
+
+def test_knots_that_make_no_way_are_refused() -> None:
+    for knots in ([0.0, 1.0, 2.0], [0.0, 1.0, 1.0, 2.0], [0.5, 1.0, 2.0, 3.0]):
+        with pytest.raises(ValueError, match="knots for"):
+            JointWay(np.array(knots), np.zeros((len(knots), 2)))
+
+
+SEEDS = range(30)
+
+
+def test_no_point_is_faster_than_its_levers() -> None:
+    """Levers bound the Jacobian of every point of a body, and are no idle bound."""
+    used = 0.0
+    for seed in SEEDS:
+        chain, _, _ = both(seed)
+        q, frame = configurations(chain, 100, seed), len(chain)
+        points = np.random.default_rng(seed).normal(size=(3, 3)) * 0.1
+        lever = chain.lever(frame, points)
+        columns = np.array([chain.point_jacobian(q, frame, point)[:, :3] for point in points])
+        speed = np.linalg.norm(columns, axis=2).max(axis=(0, 1))
+        assert (speed <= lever + 1e-12).all()
+        used = max(used, float((speed / lever)[~chain.slides].max(initial=0.0)))
+    assert used > 0.95
+
+
+STEPS = 20
+
+
+def points_at(chain: SerialChain, body: ConvexBody, q: np.ndarray) -> np.ndarray:
+    """Points of a body (..., k, 3) in the base frame."""
+    place, turn = chain.frames(q)
+    there = turn[..., body.frame, :, :] @ body.points.T
+    return np.asarray(np.swapaxes(there, -1, -2) + place[..., None, body.frame, :])
+
+
+def tip(chain: SerialChain) -> ConvexBody:
+    """What is at the tool: a point."""
+    return ConvexBody("tip", len(chain), chain.tool_place[None] * 1.5)
+
+
+def test_nothing_is_nearer_than_the_lemma_says() -> None:
+    """The distance of a tool from a point near its way, between samples of random chains with
+    hinges and slides."""
+    for seed in range(8):
+        chain, _, _ = both(seed)
+        rng = np.random.default_rng(seed)
+        knots = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 1.0, 9))])
+        way = JointWay(knots, configurations(chain, 10, seed) * rng.uniform(0.05, 1.0))
+        x = np.linspace(0.0, way.length, 251)
+        tool = tip(chain)
+        fine = np.linspace(0.0, way.length, 250 * STEPS + 1)
+        path = points_at(chain, tool, way.at(fine)[0])[:, 0]
+        near = path[rng.integers(len(path))] + rng.normal(0.0, 1e-3, 3)
+        distance = np.linalg.norm(path - near, axis=-1)
+        least = np.lib.stride_tricks.sliding_window_view(distance, STEPS + 1)[::STEPS].min(axis=1)
+        at = distance[::STEPS]
+        bound = (at[:-1] + at[1:] - travels(chain, way, x, [tool])[:, 0]) / 2
+        assert (least >= bound - 1e-12).all()
+        assert (least < at[:-1]).any()

@@ -4,27 +4,40 @@ leave."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
+from itertools import pairwise, product
 from unittest.mock import patch
 
+import mujoco
 import numpy as np
 import pytest
 
-from factory.api import Array, InputError, Project, names
-from factory.apps.arms import arrangement, obstacles, planning
+from factory.api import Array, Index, Project
+from factory.apps.arms import arrangement
 from factory.apps.arms.arming import armed, on_rails
+from factory.apps.arms.body import PAD_RADIUS, STEM, Stand, standing
+from factory.apps.arms.chain import ConvexBody, SerialChain
+from factory.apps.arms.circuit import EVERY_JOINT, candidates, circuit, free_candidates
+from factory.apps.arms.inverse import solutions
+from factory.apps.arms.joint_way import JointWay
+from factory.apps.arms.legs import NoWay, transfer
 from factory.apps.arms.model import ArmModel
-from factory.apps.arms.orders import BEYOND
-from factory.apps.arms.program_text import program_text
-from factory.apps.arms.scene import Scene
-from factory.apps.runs.options import RunOptions
-from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.simulation import Simulation
-from factory.floor.layout.layout import Layout
+from factory.apps.arms.scene import FAR, OWN, Scene, StandingBox
+from factory.apps.arms.sharing import STEPS, SweptArm
 from factory.pipeline import all_templates
 from factory.theory.lang import read_pag
-from factory.theory.nets.verify import verify
-from tests.arm_cells import SMALL, chains, project, refusal, run
+from tests.arm_cells import chains, project, refusal
+from tests.arm_models import (
+    ball,
+    configurations,
+    down,
+    nothing,
+    random_way,
+    retreat,
+    shipped,
+    straight_line,
+)
 
 POST = """root = p;
 p = inspect ( q, dwell = 0.2 ); q = mate ( a, s );
@@ -45,11 +58,6 @@ d = atomic ( box = (0.03, 0.03, 0.016), pos = (0.02, 0, 0.0281), density = 1200 
 
 
 @cache
-def post() -> Layout:
-    return project(POST, "six").layout
-
-
-@cache
 def plain(text: str) -> Project:
     templates = all_templates()
     return Project(read_pag(text, templates), templates)
@@ -59,66 +67,6 @@ def plain(text: str) -> Project:
 def six() -> ArmModel:
     """The shipped arm of six axes."""
     return ArmModel.of("six")
-
-
-def does(layout: Layout, robot: int) -> list[str]:
-    """The labels of what a robot does."""
-    return [layout.factory.operations[n].label for n in layout.factory.robots[robot].operations]
-
-
-def test_a_sub_assembly_has_a_carrier_and_a_tool_has_a_place() -> None:
-    layout = post()
-    types = [robot.type for robot in layout.factory.robots]
-    assert types == ["dot", "tool", "dot", "tool", "six"]
-    assert does(layout, 2) == ["b", "t", "s", "s/shown", "s/taken"]
-    assert does(layout, 4) == ["c", "t", "s/taken", "q"]
-    proof = verify(layout.factory.net)
-    assert proof.holds and proof.live and proof.safe and proof.reversible
-
-
-def test_it_is_made_and_nothing_touches() -> None:
-    made = run(post(), units=5, jitter=0.3, seed=5)
-    assert made.succeeded and made.refines_net and made.products == 5
-    assert made.physics is not None and made.physics.unintended_contacts == 0
-    assert made.cycle_time_s == pytest.approx(made.predicted_cycle_time_s, rel=0.01)
-
-
-def test_two_arms_share_what_is_placed() -> None:
-    """The first has all that sub-assemblies need; it takes turns with the other at the product."""
-    layout = project(ROOF, "six=2").layout
-    arms = [robot.index for robot in layout.factory.robots if robot.type == "six"]
-    assert [does(layout, arm) for arm in arms] == [["c", "s", "s/taken", "p"], ["d", "p/2"]]
-    made = run(layout, units=4, jitter=0.3, seed=3)
-    assert made.succeeded and made.products == 4
-    assert made.physics is not None and made.physics.unintended_contacts == 0
-
-
-def test_a_carrier_waits_until_the_arm_has_gone_to_leave_for_its_tool() -> None:
-    """And for its feeder, from where the arm has taken what it brought."""
-    layout = post()
-    assert layout.certificate is not None
-    starts = {order.start for order in layout.certificate.apart.orders}
-    assert starts == {"b_s", "p_s", "s_s"}
-    passes = {past.after: past for past in layout.certificate.apart.passes}
-    for label in ("q", "t"):
-        join = layout.factory.by_label[label]
-        legs = [leg for leg in chains(layout).curves.legs if not leg.brings]
-        stop = layout.visits[join.index, 4].at
-        (leg,) = [leg for leg in legs if leg.reach == pytest.approx(stop)]
-        assert passes[join.end].at == pytest.approx(stop + leg.way.off + BEYOND, abs=1e-6)
-
-
-def test_a_tour_that_begins_where_the_last_ended_turns_the_tool() -> None:
-    """So the arm is never at one configuration at two places of a way."""
-    layout = post()
-    grips = chains(layout).grips
-    assert np.allclose(grips["c"].tip[:2], grips["s/taken"].tip[:2])
-    apart = abs(grips["c"].yaw - grips["s/taken"].yaw)
-    assert apart % (np.pi / 4) == pytest.approx(np.pi / 8)
-    row = chains(layout).row(layout.factory.by_label["s/taken"].index, 4)
-    way = chains(layout).curves.legs[row].way
-    q = way.at(np.linspace(0.0, way.length, 200))[0]
-    assert np.linalg.norm(q - q[::-1], axis=1)[:90].min() > 0.1
 
 
 def test_what_can_only_be_lowered_before_comes_before() -> None:
@@ -144,15 +92,6 @@ def test_a_pile_on_rails_is_what_the_cell_makes_of_it() -> None:
     assert {n.label for n in whole.nodes} == {"p", "q", "s", "t", "a", "b", "c"}
 
 
-def test_a_sub_assembly_is_one_body() -> None:
-    """Also where nobody asks for it; `--no-fuse` is refused."""
-    simulation = Simulation(post(), RunRequest(units=1, shown=False))
-    assert simulation.physical.m.body(names.part("t", 1)).subtreemass[0] > 0.0
-    with pytest.raises(InputError) as error:
-        RunOptions(units=1, fuse=False).request(project(POST, "six"))
-    assert "each of these is one body" in error.value.diagnostics[0].message
-
-
 def test_a_heavy_part_is_held_by_a_pin() -> None:
     heavy = POST.replace("0.0502), density = 1200", "0.0502), mass = 3")
     layout = project(heavy, "six").layout
@@ -165,7 +104,6 @@ def test_a_heavy_part_is_held_by_a_pin() -> None:
 
 @pytest.mark.slow
 def test_eight_sub_assemblies_have_no_room() -> None:
-    """`test_feeders_without_room_are_refused` has parts in their place."""
     parts, joins = [], []
     for n in range(8):
         x = 0.06 * n
@@ -198,53 +136,175 @@ d = atomic ( box = (0.045, 0.05, 0.03), pos = (0.0227, 0, 0.0501) )"""
     assert why.hint.startswith("parts that are lowered")
 
 
-def test_a_part_that_is_presented_turned_is_turned_back() -> None:
-    """By the wrist, between where it is taken and where it is placed."""
-    text = """root = p;
-p = mate ( a, b );
-a = atomic ( box = (0.09, 0.06, 0.02), pos = (0, 0, 0.01), density = 1200 );
-b = atomic ( box = (0.05, 0.02, 0.02), pos = (0.01, 0, 0.0302), density = 1200, fed = 0.6 )"""
-    layout = project(text, "six").layout
-    table = chains(layout)
-    row = table.row(layout.factory.by_label["p"].index, 1)
-    leg = table.curves.legs[row]
-    _, turns = leg.chain.tool(leg.way.at(np.array([0.0, leg.way.length]))[0])
-    turned = turns[0] @ turns[1].T
-    assert np.arctan2(turned[1, 0], turned[0, 0]) == pytest.approx(0.6, abs=1e-6)
-    made = run(layout, units=2, jitter=0.3)
-    assert made.succeeded and made.physics is not None
-    assert made.physics.unintended_contacts == 0 and made.physics.product_error_max_mm < 0.01
+LEFT, RIGHT = np.array([0.2, 0.38, 0.15]), np.array([0.2, -0.38, 0.15])
+UP = ([np.linspace(0.0, 0.085, 25)[:, None] * [0.0, 0.0, 1.0]],) * 2
 
 
-def test_the_program_says_from_where_a_sub_assembly_is_taken() -> None:
-    text = program_text(post(), 4, ())
-    assert "  # take from r3: s/taken\n" in text and "  # fetch c\n" in text
-    assert 'wait_carrier("r3", "s/taken")' in text and 'wait_part("s/taken")' not in text
+def visit(chain: SerialChain, place: Array) -> Array:
+    """A straight line (25, n) of configurations up from a place, elbow up."""
+    (q,) = solutions(chain, place[None], down(0.0)[None])
+    high = chain.frames(q)[0][:, 3, 2]
+    start = q[[int(high.argmax())]]
+    return np.asarray(straight_line(chain, start, retreat(chain, start), 0.085)[0][0])
 
 
-def test_what_is_in_the_product_counts_where_a_part_is_placed() -> None:
-    """A configuration that takes a link through what is there already is none."""
-    asked, planned = list[set[str]](), planning.candidates
-
-    def seen(scene: Scene, q: Array, label: str, need: float, spared: set[str]) -> object:
-        asked.append({*scene.obstacles} - spared)
-        return np.ones(len(q)), np.zeros(len(q), int)
-
-    def tried(chain: object, takes: object, puts: object, clear: object, *more: object) -> object:
-        with patch.object(Scene, "margins", seen):
-            clear(np.zeros((1, 6)))  # type: ignore[operator]
-        return planned(chain, takes, puts, clear, *more)  # type: ignore[arg-type]
-
-    with patch.object(planning, "candidates", tried):
-        assert project(SMALL, "six").layout.certificate
-    motor, lid = asked
-    assert "'tub' in the product" in motor and "'motor' in the product" not in motor
-    assert {"'tub' in the product", "'motor' in the product"} <= {*lid}
-    assert "'lid' in the product" not in lid and "the carrier" not in lid
+def limits(chain: SerialChain) -> tuple[Array, Array]:
+    return chain.limits.low, chain.limits.high
 
 
-def test_a_feeder_in_the_way_of_another_is_refused() -> None:
-    """A pedestal as wide as the cell stands in every feeder."""
-    with patch.object(obstacles, "pedestal", lambda stand: (-9.0, 9.0, -9.0, 9.0)):
-        why = refusal(SMALL)
-    assert why.code == "Layout" and "the post of 'tub' has no room" in why.message
+def test_where_there_is_no_way_the_pair_that_blocked_is_named() -> None:
+    """A wall of a joint's positions, whatever the others are; pair 3 is nearest in it."""
+    chain = shipped("six")
+    a, b = visit(chain, LEFT)[-1], visit(chain, RIGHT)[-1]
+    wall = (a[0] + b[0]) / 2
+
+    def clearance(q: Array) -> tuple[Array, Index]:
+        margin = np.abs(q[:, 0] - wall) - 0.05
+        return margin, np.where(np.abs(q[:, 0] - wall) < 0.04, 3, 1)
+
+    blocked = transfer(a, b, clearance, limits(chain), rounds=60)
+    assert isinstance(blocked, NoWay)
+    assert blocked.pair == 3 and 0.02 < blocked.depth <= 0.056 + 1e-9 and blocked.count > 5
+    narrow = replace(chain, limits=replace(chain.limits, low=np.minimum(a, b)))
+    assert isinstance(transfer(a, b, clearance, limits(narrow), rounds=20), NoWay)
+
+
+def poses(place: Array, count: int) -> tuple[Array, Array]:
+    """One place in several turns about the vertical."""
+    turns = np.stack([down(yaw) for yaw in 2 * np.pi * np.arange(count) / count])
+    return np.tile(place, (count, 1)), turns
+
+
+def test_free_candidates_pair_any_branches() -> None:
+    """They have those on one branch, and others; each is at both poses, and clear."""
+    chain = shipped("six")
+    near = np.array([0.0, 0.3, 1.9, -0.6, -1.57, 0.0])
+    takes, puts = poses(LEFT, 2), poses(RIGHT, 2)
+    same = candidates(chain, takes, puts, nothing, near, UP)
+    free = free_candidates(chain, takes, puts, nothing, near, UP)
+    assert free.blocked is None and len(free.pairs) > len(same.pairs)
+    for k, (place, turn) in enumerate((takes, puts)):
+        at, now = chain.tool(free.pairs[:, k])
+        assert np.abs(at - place[free.grips]).max() < 1e-8
+        assert np.abs(now - turn[free.grips]).max() < 1e-8
+    none = free_candidates(chain, takes, puts, ball(chain, RIGHT, 0.3), near, UP)
+    assert len(none.pairs) == 0 and none.reached == 2 and none.blocked is not None
+
+
+def test_the_circuit_is_the_best_of_all() -> None:
+    rng = np.random.default_rng(3)
+    options = [
+        rng.normal(size=(int(rng.integers(1, 5)), 2, 3)) for _ in range(int(rng.integers(1, 5)))
+    ]
+    speed = rng.uniform(0.5, 2.0, 3)
+
+    def cost(choice: tuple[int, ...]) -> float:
+        rows = [options[k][j] for k, j in enumerate(choice)]
+        stops = [q for pair in rows for q in pair]
+        times = [np.abs(b - a) / speed for a, b in pairwise([*stops, stops[0]])]
+        return float(sum(t.max() + EVERY_JOINT * t.sum() for t in times))
+
+    best = min(product(*(range(len(pairs)) for pairs in options)), key=cost)
+    assert cost(tuple(circuit(options, speed))) == pytest.approx(cost(best), rel=1e-12)
+
+
+def scene_of(stand: Stand, boxes: tuple[StandingBox, ...] = (), name: str = "six") -> Scene:
+    half, still = np.array([0.02, 0.03, 0.015]), np.array([0.0, 1.0, 0.0, 0.0])
+    loads = {"part": [(np.array([0.0, 0.0, STEM + 0.016]), half, still)]}
+    model = ArmModel.of(name)
+    return Scene(model, standing(model, stand), loads, boxes)
+
+
+def swept_by(scene: Scene, chain: SerialChain, way: JointWay, label: str = "") -> SweptArm:
+    """What an arm sweeps with its tool, and with a part that fills a ball round it."""
+    carried = [ConvexBody("part", len(chain), chain.tool_place[None], 0.05)]
+    return SweptArm.of(scene, chain, way, carried, label)
+
+
+def both_scenes(name: str) -> tuple[Scene, Scene]:
+    """Two arms that face each other."""
+    off = {"six": 0.7, "scara": 0.5}[name]
+    return (
+        scene_of(Stand((0.0, -off, 0.1), 1.57, PAD_RADIUS), name=name),
+        scene_of(Stand((0.0, off, 0.1), -1.57, PAD_RADIUS), name=name),
+    )
+
+
+def test_the_capsules_of_an_arm_are_no_farther_apart_than_its_bodies() -> None:
+    """Spheres within the shapes of a part and links, against the capsules."""
+    scene, _ = both_scenes("six")
+    way = random_way(shipped("six"), 5)
+    swept = swept_by(scene, shipped("six"), way, "part")
+    geoms = [*scene.links, *scene.loads["part"]]
+    q = way.at(np.linspace(0.0, way.length, STEPS + 1))[0]
+    rng = np.random.default_rng(6)
+    for row in range(0, STEPS + 1, 93):
+        scene.d.qpos[:] = q[row]
+        mujoco.mj_kinematics(scene.m, scene.d)
+        for ends, radius, g in zip(swept.ends[row], swept.radius, geoms, strict=True):
+            half = scene.m.geom_aabb[g, 3:]
+            inner = rng.choice([-1.0, 1.0], (8, 3)) * half
+            if scene.m.geom_type[g] != mujoco.mjtGeom.mjGEOM_BOX:
+                inner[:, :2] /= np.sqrt(2)
+            if scene.m.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE:
+                inner *= np.sqrt(2 / 3)
+            elif scene.m.geom_type[g] == mujoco.mjtGeom.mjGEOM_CAPSULE:
+                inner[:, 2] = np.sign(inner[:, 2]) * scene.m.geom_size[g, 1]
+            turn = scene.d.geom_xmat[g].reshape(3, 3)
+            points = scene.d.geom_xpos[g] + scene.m.geom_aabb[g, :3] @ turn.T + inner @ turn.T
+            u = ends[1] - ends[0]
+            share = np.clip((points - ends[0]) @ u / max(float(u @ u), 1e-12), 0.0, 1.0)
+            off = np.linalg.norm(points - ends[0] - share[:, None] * u, axis=1)
+            assert off.max() <= radius + 1e-9, scene.names[g]
+
+
+def test_a_part_that_is_held_turned_is_turned() -> None:
+    """The engine looks at the frame that a geom has got after it was compiled."""
+    angle = 0.0
+    scene = scene_of(Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS))
+    m, d, (load,) = scene.m, scene.d, scene.loads["part"]
+    m.geom_quat[load] = [0.0, np.cos(angle / 2), np.sin(angle / 2), 0.0]
+    mujoco.mj_kinematics(m, d)
+    tool = d.xmat[m.geom_bodyid[load]].reshape(3, 3)
+    held, turn = tool.T @ d.geom_xmat[load].reshape(3, 3), np.empty(9)
+    mujoco.mju_quat2Mat(turn, m.geom_quat[load])
+    assert np.abs(held - turn.reshape(3, 3)).max() < 1e-9
+
+
+def test_margins_are_those_of_all_pairs() -> None:
+    """Against the engine's distances of every pair, none left out."""
+    rng = np.random.default_rng(7)
+    boxes = tuple(
+        StandingBox(
+            f"box {k}",
+            tuple((low := rng.uniform(-0.8, 0.6, 3)).tolist()),
+            tuple((low + size).tolist()),
+        )
+        for k, size in enumerate(rng.uniform(0.05, 0.2, (8, 3)))
+    )
+    scene, need = scene_of(Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS), boxes), 0.01
+    chain: SerialChain = shipped("six")
+    q, spared = configurations(chain, 60, 8), {"box 3"}
+    seen = 0
+    for label in ("", "part"):
+        margin, pair = scene.margins(q, label, need, spared)
+        m, d = scene.m, scene.d
+        moving = [*scene.links, *scene.loads.get(label, ())]
+        still = [g for g in scene.still if scene.say(g * m.ngeom).split(" and ")[0] not in spared]
+        for row in range(len(q)):
+            d.qpos[:] = q[row]
+            mujoco.mj_kinematics(m, d)
+            away = [
+                mujoco.mj_geomDistance(m, d, a, b, FAR, None) - need for a in moving for b in still
+            ]
+            own = [mujoco.mj_geomDistance(m, d, a, b, FAR, None) - OWN for a, b in scene._own]
+            if label:
+                own += [
+                    mujoco.mj_geomDistance(m, d, a, b, FAR, None) - OWN
+                    for a in scene.loads[label]
+                    for b in scene._far_links
+                ]
+            least = min(FAR - need, *away, *own)
+            assert margin[row] == pytest.approx(least, abs=1e-6), (row, scene.say(int(pair[row])))
+            seen += least < 0.0
+    assert 10 < seen < 110

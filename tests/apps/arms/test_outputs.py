@@ -3,20 +3,17 @@ file that says something else."""
 
 from __future__ import annotations
 
-import csv
 import re
-from functools import cache
-from io import StringIO
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
-from factory.api import FactoryError, Layout, Pace, Project, RunRequest, Simulation
+from factory.api import FactoryError, Layout, Project, RunRequest, Simulation
 from factory.apps.arms import planning
 from factory.apps.arms.ground import with_arm
-from factory.apps.arms.joint_table import STEP, joint_table, legs_of
+from factory.apps.arms.joint_table import legs_of
 from factory.apps.arms.legs import NoWay
 from factory.apps.exports import exporters
 from factory.apps.exports.chain_rest import joints_at_rest
@@ -54,61 +51,6 @@ def laid(project: Project) -> Layout:
     return project.layout
 
 
-@cache
-def rows_of(text: str) -> list[dict[str, str]]:
-    return list(csv.DictReader(StringIO(text)))
-
-
-def table(project: Project, robot: int) -> list[dict[str, str]]:
-    return rows_of(joint_table(laid(project), robot, Pace.of(project.settings)))
-
-
-# --- the table of joints --------------------------------------------------------------------------
-
-
-def test_the_rows_of_the_table_are_on_the_ways(small: Project) -> None:
-    """By the nearest point of the way itself."""
-    rows, legs = table(small, 1), legs_of(laid(small), 1)
-    assert [*dict.fromkeys(row["leg"] for row in rows)] == [o.operation.label for o in legs]
-    assert [leg.brings for leg in legs] == [False, True] * 2
-    for leg in legs:
-        chosen = [row for row in rows if row["leg"] == leg.operation.label]
-        q = np.array([[float(v) for k, v in row.items() if "/" in k] for row in chosen])
-        x = np.array([float(row["x"]) for row in chosen])
-        assert abs(x[0] - leg.ends[0]) < 1e-9 and abs(x[-1] - leg.ends[1]) < 1e-9
-        s = np.abs(x - leg.ends[0])
-        assert np.abs(q - leg.way.at(s)[0]).max() < 1e-9
-        assert leg.way.nearest(q, s)[1].max() < 1e-9
-
-
-def test_the_legs_of_the_table_follow_each_other(small: Project) -> None:
-    """The arm is where the leg before has left it, and at rest."""
-    rows = table(small, 1)
-    q = np.array([[float(v) for k, v in row.items() if "/" in k] for row in rows])
-    begins = [n for n in range(len(rows)) if rows[n]["leg"] != rows[n - 1]["leg"]]
-    for begin in begins:
-        assert np.abs(q[begin] - q[begin - 1]).max() < 1e-6
-        assert np.abs(q[begin + 1] - q[begin]).max() < 1e-3
-
-
-def test_joints_keep_their_limits_along_the_table(small: Project) -> None:
-    rows, legs = table(small, 1), legs_of(laid(small), 1)
-    limits = legs[0].chains.curves.legs[0].chain.limits
-    fastest = np.zeros(len(limits.speed))
-    for leg in legs:
-        chosen = [row for row in rows if row["leg"] == leg.operation.label]
-        q = np.array([[float(v) for k, v in row.items() if "/" in k] for row in chosen])
-        t = np.array([float(row["t"]) for row in chosen])
-        assert np.allclose(np.diff(t)[:-1], STEP) and 0 < np.diff(t)[-1] <= STEP + 1e-6
-        speed = np.diff(q, axis=0)[:-1] / STEP
-        gain = np.diff(speed, axis=0) / STEP
-        fastest = np.maximum(fastest, np.abs(speed).max(axis=0))
-        assert (np.abs(speed) <= limits.speed).all()
-        assert (np.abs(gain) <= limits.acceleration * (1 + 1e-6)).all()
-        assert ((q >= limits.low) & (q <= limits.high)).all()
-    assert (fastest / limits.speed).max() > 0.5
-
-
 def test_the_program_tells_each_leg_and_that_it_is_not_certified(small: Project) -> None:
     text, _ = export(exporter("arm-program"), small.file, small)
     assert isinstance(text, str) and "is not\n# certified" in text
@@ -130,9 +72,6 @@ def test_a_folder_gets_a_file_for_every_arm(small: Project, tmp_path: Path) -> N
         assert [*files] == [tmp_path / name]
     with pytest.raises(FactoryError, match="--of 'r1' is none of the arms"):
         export(exporter("joints", "r1"), small.file, small, of="r1")
-
-
-# --- the model ------------------------------------------------------------------------------------
 
 
 def test_the_written_model_stands_still_in_its_keyframe(small: Project) -> None:
@@ -179,28 +118,6 @@ def test_no_way_names_what_is_in_the_way(small: Project, monkeypatch: pytest.Mon
     assert told.hint == "leave out --arm: rails make it"
 
 
-# --- the page of a running cell ------------------------------------------------------------------
-
-
-def test_a_page_shows_all_that_an_arm_comes_to(small: Project) -> None:
-    """Bodies of the arm come no farther in a run, and nearly as far; drawing does not move it."""
-    made = Simulation(laid(small), RunRequest(units=2))
-    low, high = stage_of(made).reach
-    world = made.physical
-    arm = np.flatnonzero(world.m.body_rootid == world.m.body("r2/carriage").id)
-    least, most = world.d.xpos[arm].copy(), world.d.xpos[arm].copy()
-    while len(made.supervisor.events) < 4 * len(made.layout.factory.operations):
-        made.supervisor.step()
-        least, most = np.minimum(least, world.d.xpos[arm]), np.maximum(most, world.d.xpos[arm])
-    assert len(arm) >= 6
-    assert (low[arm] < least + 2e-3).all() and (high[arm] > most - 2e-3).all()
-    assert (least < low[arm] + 0.01).all() and (most > high[arm] - 0.01).all()
-    alone = Simulation(laid(small), RunRequest(units=2))
-    while len(alone.supervisor.events) < len(made.supervisor.events):
-        alone.supervisor.step()
-    assert [*alone.supervisor.events] == [*made.supervisor.events]
-
-
 def test_a_page_shows_where_an_arm_places(small: Project) -> None:
     """Both parts are placed where the carrier stands in a run."""
     made = Simulation(laid(small), RunRequest(units=1))
@@ -211,18 +128,7 @@ def test_a_page_shows_where_an_arm_places(small: Project) -> None:
     assert made.physical.d.site("r1/nest").xpos[:2] == pytest.approx(place, abs=1e-3)
 
 
-# --- what does not go with a cell -----------------------------------------------------------------
-
-REFUSED = [
-    (("run",), ("--spares", "1"), "--spares"),
-    (("run",), ("--faults", "faults.toml"), "--faults"),
-    (("run",), ("--faults", "faults.toml", "--spares", "1"), "--faults and --spares"),
-    (("view",), ("--spares", "1", "--port", "0"), "--spares"),
-    (("build",), ("-o", "made"), "-o DIR"),
-    (("build",), ("-o", "made", "--mjcf", "made.xml"), "-o DIR"),
-    (("export",), ("--format", "dxf", "-o", "made.dxf"), "format dxf"),
-    (("export",), ("--format", "urdf", "-o", "made.urdf"), "format urdf"),
-]
+REFUSED = [(("view",), ("--spares", "1", "--port", "0"), "--spares")]
 
 
 @pytest.mark.parametrize(("command", "options", "what"), REFUSED)
@@ -269,25 +175,3 @@ def test_no_plan_or_recovery_of_a_cell_is_made_from_python(small: Project) -> No
     made = Simulation(laid(small), RunRequest("ideal", 1, recovers=True))
     with pytest.raises(FactoryError, match=r"recovery .* cannot be combined"):
         recover(made)
-
-
-def test_robots_of_a_cell_can_run_their_own_programs(small: Project) -> None:
-    made = Simulation(laid(small), RunRequest("mujoco", 1, distributed=True))
-    assert made.run().succeeded
-
-
-def test_a_build_says_what_is_certified(small: Project, tmp_path: Path, run: Terminal) -> None:
-    """Compared with no layout on rails: that is none of a cell."""
-    file = tmp_path / "small.pag"
-    file.write_text(SMALL)
-    made = laid(small)
-    done = run("build", file, "--arm", "six", "--mjcf", tmp_path / "small.xml", "--json")
-    assert done.status == 0
-    figures = done.json["layout"]
-    assert figures["area_m2"] == pytest.approx(made.area, abs=1e-6)
-    assert figures["cycle_time_bound_s"] is None and figures["first_feasible"] is None
-    assert mujoco.MjModel.from_xml_path(str(tmp_path / "small.xml")).nu > 0
-    done = run("build", file, "--arm", "six", "--mjcf", tmp_path / "again.xml")
-    assert done.status == 0
-    assert "clearance 4 mm proved" in done.out
-    assert f"cycle {figures['predicted_cycle_time_s']:.2f} s ({figures['bottleneck']})" in done.out

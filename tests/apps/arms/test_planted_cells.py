@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from factory.apps.arms.cell import CellChains
 from factory.apps.arms.curves import LegTable
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.runs.watched import watched
@@ -97,30 +96,6 @@ def without_gates(layout: Layout, eps: float) -> tuple[Mode, ...]:
     )
 
 
-def nearer(layout: Layout) -> Layout:
-    """The feeder of 'motor' is 30 mm nearer to the arm than it was planned."""
-    told = chains(layout)
-    well, stand = told.wells["motor"], told.stands[1]
-    off = np.array(stand.place[:2]) - well.place
-    dx, dy = (0.03 * off / np.linalg.norm(off)).tolist()
-
-    def shifted(box: tuple[float, float, float, float]) -> Any:
-        xlo, xhi, ylo, yhi = box
-        return xlo + dx, xhi + dx, ylo + dy, yhi + dy
-
-    feeder = well.feeder
-    boxes = {name: shifted(getattr(feeder, name)) for name in ("post", "boom", "housing")}
-    moved = replace(
-        well, place=(well.place[0] + dx, well.place[1] + dy), feeder=replace(feeder, **boxes)
-    )
-    key = layout.factory.by_label["motor"].index, 1
-    visits = dict(layout.visits)
-    x, y = visits[key].shift
-    visits[key] = replace(visits[key], shift=(x + dx, y + dy))
-    made = with_chains(layout, wells={**told.wells, "motor": moved})
-    return replace(made, visits=visits)
-
-
 def too_near(layout: Layout) -> Layout:
     """Arms wait for each other where they wait for the carrier."""
     return with_chains(layout, private=chains(layout).standoffs)
@@ -162,32 +137,8 @@ def heavy(layout: Layout) -> Layout:
     return replace(layout, product=replace(layout.product, solids=solids))
 
 
-class Turned(CellChains):
-    """A cell that has parts held 2° from where they are."""
-
-    def grip(self, robot: int, label: str, centre: Any) -> tuple[float, ...]:
-        import mujoco
-
-        *place, w, x, y, z = super().grip(robot, label, centre)
-        made = np.empty(4)
-        half = np.radians(1.0)
-        mujoco.mju_mulQuat(
-            made, np.array([w, x, y, z]), np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
-        )
-        return (*place, *made.tolist())
-
-
-def turned(layout: Layout) -> Layout:
-    told = chains(layout)
-    values = {name: getattr(told, name) for name in told.__dataclass_fields__}
-    return replace(layout, chains=Turned(**values))
-
-
 FAULTS = (
     Fault("nothing", ()),
-    Fault("nothing, with two arms", (), arm="six=2", every_tick=True),
-    Fault("the carrier is slow", (), arm="beside", patches=slow(0, 0.2)),
-    Fault("an arm is slow", (), arm="six=2", patches=slow(1, 0.2)),
     Fault(
         "an arm is slow, no order places",
         ("Contact",),
@@ -208,12 +159,9 @@ FAULTS = (
         arm="beside",
         patches={"operation_modes": without_gates, **slow(0, 0.2)},
     ),
-    Fault("a feeder is 30 mm nearer", ("Missed", "HandOffGap"), layout=nearer),
     Fault("the last knot of a way is off", ("Dropped", "Contact"), layout=bent(1.0, True)),
-    Fault("a knot near the last is off", ("Dropped", "Contact"), layout=bent(0.97, True)),
     Fault("a knot in the middle is off", ("Astray",), layout=bent(0.5, False), every_tick=True),
     Fault("parts are twenty times as heavy", ("Dropped",), layout=heavy),
-    Fault("grips are off by 2°", ("Missed", "HandOffTurn"), layout=turned),
 )
 
 

@@ -7,11 +7,15 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+import trimesh
 
 from factory.api import InputError
-from factory.apps.arms.chain import SerialChain
+from factory.apps.arms.body import Stand, standing
+from factory.apps.arms.certifying import uncertified
+from factory.apps.arms.model import KINDS, ArmModel
+from factory.apps.arms.reach import ring_of
 from factory.apps.arms.read import MODELS, chain_of, read_chain
-from tests.arm_models import configurations, random_arm, shipped
+from tests.arm_models import random_way, shipped
 
 LIMITS = (
     '<custom><numeric name="speed" data="1 2"/><numeric name="acceleration" data="3 4"/></custom>'
@@ -35,23 +39,18 @@ def arm(
 
 
 BAD = {
-    "is a ball joint": arm(second='<joint name="wrist" type="ball" range="0 90"/>'),
-    "joint 'pan' is a free joint": arm(first='<freejoint name="pan"/>'),
     "has no site 'tool'": arm(site='<site name="tip"/>'),
     "is not one chain: joint 'finger' is not between base and tool": arm(
         beside=LINK.format('<joint name="finger" range="0 9"/>') + "</body>"
     ),
+    "says no speed of its joints": arm(head=""),
+    "is a ball joint": arm(second='<joint name="wrist" type="ball" range="0 90"/>'),
     "has no joints": arm(first="", second=""),
     "joint 'wrist' has no limits": arm(second='<joint name="wrist" axis="0 1 0"/>'),
     "joint 'wrist' has a spring": arm(second=SECOND.replace("/>", ' stiffness="3"/>')),
     "has equality constraints or tendons": arm(
         after='<equality><joint joint1="pan" joint2="wrist"/></equality>'
     ),
-    "says no speed of its joints": arm(head=""),
-    "says no acceleration of its joints": arm(
-        head='<custom><numeric name="speed" data="1 2"/></custom>'
-    ),
-    "has the speed [1.0, 2.0, 3.0]": arm(head=LIMITS.replace("1 2", "1 2 3")),
     "has the acceleration [3.0, -4.0]": arm(head=LIMITS.replace("3 4", "3 -4")),
     "the engine cannot compile it: ": "<mujoco><arm/></mujoco>",
 }
@@ -78,20 +77,6 @@ def test_hints_say_what_would_be_valid() -> None:
     assert "fingers" in hint("is not one chain: joint 'finger' is not between base and tool")
 
 
-def test_the_same_arm_without_a_fault_is_read() -> None:
-    """In degrees, which the file does not say; limits beside the file come first."""
-    chain = chain_of(arm())
-    assert chain.joints == ("pan", "wrist") and not chain.slides.any()
-    assert chain.limits.high == pytest.approx([np.pi / 2] * 2)
-    assert chain.limits.speed.tolist() == [1.0, 2.0]
-    assert chain.limits.acceleration.tolist() == [3.0, 4.0]
-    assert np.isinf(chain.limits.torque).all()
-    assert chain.tool(np.zeros(2))[0] == pytest.approx([0.1, 0.0, 0.4])
-    other = chain_of(arm(), values={"speed": [5.0, 6.0]})
-    assert other.limits.speed.tolist() == [5.0, 6.0]
-    assert chain_of(arm(site='<site name="tip"/>'), tool="tip").joints == ("pan", "wrist")
-
-
 def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
     drives = (
         '<actuator><position joint="pan" kp="1" forcerange="-9 7"/>'
@@ -100,22 +85,6 @@ def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
     assert chain_of(arm(after=drives)).limits.torque.tolist() == [7.0, 6.0]
     weak = FIRST.replace("/>", ' actuatorfrcrange="-5 6"/>')
     assert chain_of(arm(first=weak, after=drives)).limits.torque.tolist() == [5.0, 6.0]
-
-
-def test_an_arm_on_a_pedestal_is_read_in_the_frame_of_its_base() -> None:
-    """What stands beside it is not the arm's, and its place does not matter."""
-    inside = arm().partition("<worldbody>")[2].partition("</worldbody>")[0]
-    places = 'pos="0 0 0"', 'pos="1 2 3" euler="0 30 70"'
-    chains = []
-    for place in places:
-        base = f'<body name="base" {place}><geom name="foot" size="0.1"/>{inside}</body>'
-        text = f'<geom name="floor" type="plane" size="1 1 1"/><geom name="wall" size="2"/>{base}'
-        chains.append(chain_of(f"<mujoco>{LIMITS}<worldbody>{text}</worldbody></mujoco>"))
-    one, other = chains
-    assert [body.name for body in one.bodies] == ["foot", "geom 4", "geom 5"]
-    q = configurations(one, 5, 0)
-    for value, same in zip(one.tool(q), other.tool(q), strict=True):
-        assert np.abs(value - same).max() < 1e-12
 
 
 def surface(m: mujoco.MjModel, geom: int, ways: np.ndarray) -> np.ndarray:
@@ -178,14 +147,6 @@ def test_bodies_contain_their_geoms_and_hardly_more() -> None:
     assert len(chain.bodies) == 8
 
 
-def test_what_is_only_shown_does_not_count_unless_nothing_else_is_there() -> None:
-    shown = '<geom name="shown" size="0.1" contype="0" conaffinity="0"/>'
-    text = arm(second=SECOND + shown)
-    assert "shown" not in [body.name for body in chain_of(text).bodies]
-    nothing = text.replace('<geom size="0.05"/>', '<geom size="0.05" contype="0" conaffinity="0"/>')
-    assert "shown" in [body.name for body in chain_of(nothing).bodies]
-
-
 @pytest.mark.parametrize("name", ["six", "scara"])
 def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
     """Each shown geom lies within the hull of what is solid of its link: nothing drawn sticks out
@@ -206,42 +167,138 @@ def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
         assert (extents[body, False] >= extents[body, True] - 0.02).all()
 
 
-def test_the_shipped_arms_have_the_lengths_and_limits_they_are_said_to_have() -> None:
-    six, scara = shipped("six"), shipped("scara")
-    at, turn = six.tool(np.zeros(6))
-    assert at == pytest.approx([0.0, 0.133 + 0.1, 0.163 + 0.425 + 0.392 + 0.1])
-    assert turn[:, 2] == pytest.approx([0.0, 1.0, 0.0], abs=1e-7)
-    assert six.limits.torque.tolist() == [150.0] * 3 + [28.0] * 3
-    assert six.limits.speed.tolist() == [2.0] * 6
-    assert scara.slides.tolist() == [False, False, True, False]
-    at, turn = scara.tool(np.array([0.0, 0.0, 0.1, 0.0]))
-    assert at == pytest.approx([0.5, 0.0, 0.1]) and turn[2, 2] == pytest.approx(-1.0)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_masses_are_those_of_the_file(seed: int) -> None:
-    """What a link weighs is there once, whatever bodies are fixed to it."""
-    text = random_arm(seed)
-    chain: SerialChain = chain_of(text)
-    m = mujoco.MjModel.from_xml_string(text)
-    moving = np.isin(np.arange(m.nbody), below(m, int(m.jnt_bodyid[0])))
-    assert chain.inertia.mass.sum() == pytest.approx(m.body_mass[moving].sum())
-    weight = m.body_mass * (1 - m.body_gravcomp)
-    assert chain.inertia.weight.sum() == pytest.approx(weight[moving].sum())
-
-
-def below(m: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all that hang on it."""
-    there = [root]
-    for body in range(root + 1, m.nbody):
-        if int(m.body_parentid[body]) in there:
-            there.append(body)
-    return there
-
-
 def test_a_file_is_read_where_it_is(tmp_path: Path) -> None:
     """Meshes beside it are found; a file that is not there is an error of the same kind."""
     (tmp_path / "arm.xml").write_text(arm())
     assert read_chain(tmp_path / "arm.xml").joints == ("pan", "wrist")
     with pytest.raises(InputError, match="cannot compile"):
         read_chain(tmp_path / "none.xml")
+
+
+OWN = """<mujoco model="own">
+  <compiler angle="degree" meshdir="shapes"/>
+  <custom>
+    <numeric name="speed" data="2 2 2 2 2 2 2"/>
+    <numeric name="acceleration" data="16 16 16 16 16 16 16"/>
+  </custom>
+  <asset><mesh name="link" file="link.stl"/></asset>
+  <default>
+    <joint range="-170 170" armature="0.5" damping="0.2"/>
+    <geom density="600" rgba="0.85 0.55 0.15 1"/>
+  </default>
+  <worldbody>
+    <light pos="0 0 3"/>
+    <body name="foot" pos="5 5 5"><geom type="cylinder" size="0.07 0.06" pos="0 0 0.06"/>
+      <body name="l1" pos="0 0 0.16"><joint name="a1" axis="0 0 1"/>
+        <geom type="capsule" size="0.05" fromto="0 0 0 0 0 0.14"/>
+        <body name="l2" pos="0 0 0.18"><joint name="a2" axis="0 1 0" range="-120 120"/>
+          <geom type="mesh" mesh="link"/>
+          <body name="l3" pos="0 0 0.21"><joint name="a3" axis="0 0 1"/>
+            <geom type="capsule" size="0.04" fromto="0 0 0.02 0 0 0.16"/>
+            <body name="l4" pos="0 0 0.21"><joint name="a4" axis="0 1 0" range="-130 130"/>
+              <geom type="capsule" size="0.04" fromto="0 0 0 0 0 0.16"/>
+              <body name="l5" pos="0 0 0.2"><joint name="a5" axis="0 0 1" armature="0.15"/>
+                <geom type="capsule" size="0.035" fromto="0 0 0.03 0 0 0.14"/>
+                <body name="l6" pos="0 0 0.2">
+                  <joint name="a6" axis="0 1 0" range="-120 120" armature="0.1"/>
+                  <geom type="capsule" size="0.035" fromto="0 0 0 0 0 0.05"/>
+                  <body name="tool" pos="0 0 0.1"><joint name="a7" axis="0 0 1" armature="0.1"/>
+                    <geom type="cylinder" size="0.03 0.015"/>
+                    <site name="tool" pos="0 0 0.02"/>
+                  </body>
+                </body>
+              </body>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+  <contact><exclude body1="l1" body2="l3"/></contact>
+</mujoco>
+"""
+"""Seven axes in degrees, a link that is a mesh, a body called `tool`, and a foot that overlaps the
+first link."""
+
+BOX = """root = x;
+x = mate ( a, b );
+a = atomic ( box = (0.08, 0.07, 0.04), pos = (0, 0, 0.02) );
+b = atomic ( box = (0.03, 0.03, 0.03), pos = (0, 0, 0.0552) )"""
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> Path:
+    """The file of the arm."""
+    (tmp_path / "shapes").mkdir()
+    link = trimesh.creation.capsule(height=0.13, radius=0.045, count=[12, 12])
+    link.apply_translation([0.0, 0.0, 0.03])
+    link.export(tmp_path / "shapes" / "link.stl")
+    path = tmp_path / "seven-axes.xml"
+    path.write_text(OWN)
+    return path
+
+
+def test_what_a_file_leaves_out_of_contact_stays_so(own: Path) -> None:
+    """And the base and the first link, which overlap."""
+    root = standing(ArmModel.of(str(own)), Stand((0.0, 0.0, 0.1), 0.0, 0.008))
+    pairs = {(p.get("body1"), p.get("body2")) for p in root.findall("contact/exclude")}
+    assert pairs == {("l1", "l3"), ("carriage", "l1")}
+    names = [body.get("name") for body in root.iter("body")]
+    assert names.count("tool") == 1 and "own_tool" in names
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "words"),
+    [
+        (('<numeric name="speed" data="2 2 2 2 2 2 2"/>', ""), "BadArm", "no speed"),
+        (('type="mesh"', 'type="mish"'), "BadArm", "cannot compile"),
+    ],
+)
+def test_a_file_that_is_no_arm_is_refused(
+    own: Path, change: tuple[str, str], code: str, words: str
+) -> None:
+    own.write_text(OWN.replace(*change))
+    with pytest.raises(InputError) as error:
+        ArmModel.of(str(own))
+    (why,) = error.value.diagnostics
+    assert why.code == code and words in why.message and why.hint
+
+
+def test_an_arm_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    for asked in ("seven", str(tmp_path / "none.xml")):
+        with pytest.raises(InputError) as error:
+            ArmModel.of(asked)
+        (why,) = error.value.diagnostics
+        assert why.code == "Usage" and all(kind in why.hint for kind in KINDS)
+
+
+def test_a_ring_is_where_the_tool_comes_to_all_heights() -> None:
+    """The SCARA has to stand higher, and comes to no heights farther apart than its slide."""
+    six, scara = shipped("six"), shipped("scara")
+    ring = ring_of(six, 0.1, 0.3)
+    assert ring is not None and ring.base == 0.10
+    assert 0.1 < ring.inner < ring.at(0.41) < ring.outer < 1.0
+    broad = ring_of(six, 0.1, 0.3, 0.1)
+    assert broad is not None and broad.at(0.0) == broad.inner + 0.1
+    assert broad.at(1.0) == broad.outer - 0.1
+    low = ring_of(scara, 0.02, 0.15)
+    assert low is None or low.base > 0.1 or low.outer < 0.6
+    assert ring_of(scara, 0.1, 0.1 + 0.3) is None
+
+
+def test_a_way_is_certified_only_if_nothing_between_samples_is_near() -> None:
+    """A needle between two samples, which those do not come near, is seen."""
+    chain = shipped("six")
+    way = random_way(chain, 3)
+    at = 0.5137 * way.length
+    needle = way.at(np.array([at]))[0][0]
+
+    def margins(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        reach = chain.levers().max(axis=0)
+        far = np.abs(q - needle) @ reach
+        return far - 1e-3, np.full(len(q), 7)
+
+    blocked = uncertified(chain, way, (0.0, way.length), chain.bodies, margins)
+    assert blocked is not None and blocked.pair == 7
+    clear = uncertified(chain, way, (0.0, 0.4 * way.length), chain.bodies, margins)
+    assert clear is None

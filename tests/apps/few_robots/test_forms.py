@@ -3,56 +3,60 @@ the same, the net is proved as before, and the choice is the best for what it go
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
+import hashlib
+import random
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import product
-from math import inf
+from itertools import islice
+from pathlib import Path
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-import factory
 from factory.apps.few_robots.aim import Aim
-from factory.apps.few_robots.candidate import Candidate
+from factory.apps.few_robots.folding import fold
 from factory.apps.few_robots.forms import (
     APART,
     FormsTask,
     Option,
-    _finished,
-    _joined,
     _over,
     best_forms,
     joins,
-    written_forms,
 )
-from factory.apps.few_robots.lines import Admitted, admitted
-from factory.apps.few_robots.search import Search, allocated
+from factory.apps.few_robots.lines import Admitted, Shift
+from factory.apps.few_robots.parallel import in_parallel
+from factory.apps.few_robots.search import allocated
+from factory.apps.few_robots.sharing import with_branches
+from factory.apps.log.plan_file import PLAN_NAME, plan_files, read_plan
+from factory.engine.simulation.request import RunRequest
+from factory.engine.simulation.simulation import Simulation
+from factory.floor.layout.clearance import certify
 from factory.floor.layout.durations import Pace
+from factory.floor.layout.saved import LayoutTable
+from factory.floor.layout.shapes import payload_boxes
+from factory.floor.mating.mating import judged
 from factory.pipeline import Project, read
+from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
-from factory.support.tables import table_of, value_of
+from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.expanding import expand
+from factory.theory.compiler.tees import on_stems
 from factory.theory.lang.template_reader import load_templates
+from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import THIRD, Plan
 from factory.theory.problem.robot_types import load_catalogue
-from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
-from tests.pag_values import SHAPES, random_pag
 from tests.pag_values import TEMPLATES as OWN
 from tests.paths import EXAMPLES
+from tests.random_products import random_product
+from tests.state_space import explored
 
 TEMPLATES = {**OWN, **load_templates([templates_folder()])}
 """The shipped ones, and those that random PAGs use beside them."""
-
-sizes, seeds, shapes = st.integers(2, 24), st.integers(0, 10_000), st.sampled_from(SHAPES)
 
 
 def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
@@ -64,134 +68,12 @@ def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
     return FormsTask(pag, TEMPLATES, admits or {}, boxes, Pace())
 
 
-def parts_made(plain: Factory) -> set[frozenset[str]]:
-    """The parts of all that is joined."""
-    return {frozenset(plain.contents[o.label]) for o in plain.operations[:-1] if len(o.inputs) > 1}
-
-
-@given(sizes, seeds, shapes, st.sampled_from([0.5, 1.0, 2.0, 4.0, inf]))
-def test_the_same_is_joined_with_the_robots_that_are_counted(
-    size: int, seed: int, shape: str, bound: float
-) -> None:
-    pag = random_pag(size, seed, shape)
-    forms, _ = best_forms(task_of(pag), bound)
-    plan = Plan(forms)
-    assert value_of(Plan, json.loads(json.dumps(table_of(plan)))) == plan, "it can be written down"
-    made = compile_pag(pag, TEMPLATES, load_catalogue(), plan=plan)
-    assert parts_made(made) == parts_made(compile_pag(pag, TEMPLATES, load_catalogue()))
-    assert verify(made.net).holds
-    parts = len(made.leaves)
-    tools = sum(robot.type == "tool" for robot in made.robots)
-    thirds = sum(form == THIRD for form in forms.values())
-    assert len(made.robots) - tools == parts + thirds
-    if bound == inf:
-        assert thirds == 0, "without a bound no robot is spent on taking over"
-
-
-def every_way(task: FormsTask, label: str, axis: int, bound: float) -> Iterator[Option]:
-    """All ways to make a label, none left out."""
-    node = task.nodes[label]
-    if not node.inputs:
-        yield Option(0, 0, 0.0, 0, task.pace.lost)
-        return
-    for pile in (THIRD, 0, 1) if label in task.free else (0,):
-        ways = [
-            [*every_way(task, x, axis if n == pile else 1 - axis, bound)]
-            for n, x in enumerate(node.inputs)
-        ]
-        fault = int(len(ways) > 1 and label in task.admitted and _blocked(task, label, axis, pile))
-        for inputs in product(*ways):
-            yield _joined(task, node, pile, inputs, bound, (fault, fault))
-
-
-def _blocked(task: FormsTask, label: str, axis: int, pile: int) -> bool:
-    return (label, pile) in task.refused or task.admitted[label].slides[axis] == 0
-
-
-@given(st.integers(3, 9), seeds, st.sampled_from(["any", "chain", "balanced"]), st.data())
-def test_no_other_forms_are_better(size: int, seed: int, shape: str, data: st.DataObject) -> None:
-    pag = random_pag(size, seed, shape, arity=3)
-    sliding = st.sampled_from([(3, 3), (3, 0), (0, 3), (0, 0)])
-    labels = [label for node in pag.nodes if len(node.inputs) > 1 for label in joins(node)]
-    admits = {label: Admitted(data.draw(sliding), (0, 0)) for label in labels}
-    task, bound = task_of(pag, admits), data.draw(st.sampled_from([0.8, 1.5, 3.0]))
-    best = min(
-        _finished(task, pag.root, option, bound).rank
-        for option in every_way(task, pag.root, 1, bound)
-    )
-    forms, _ = best_forms(task, bound)
-    chosen = [
-        _finished(task, pag.root, option, bound).rank
-        for option in every_way(task, pag.root, 1, bound)
-        if _forms(task, option) == forms
-    ]
-    assert min(chosen) == pytest.approx(best)
-
-
-def _forms(task: FormsTask, option: Option) -> dict[str, int]:
-    found, stack = {}, [(task.pag.root, option)]
-    while stack:
-        label, one = stack.pop()
-        if label in task.free:
-            found[label] = one.pile
-        stack += zip(task.nodes[label].inputs, one.inputs, strict=True)
-    return found
-
-
-def test_a_statement_of_many_inputs_is_cut_where_its_pile_changes_hands() -> None:
-    pag = table_pag("s", ("s", "mate", "a b c d e", {}), *((x, "atomic", "", {}) for x in "abcde"))
-    forms = {"s/2": 1, "s/3": 0, "s/4": THIRD, "s": 1}
-    nodes = expand(pag, TEMPLATES, Plan(forms)).items()
-    assert {x: (node.template.name, node.inputs) for x, node in nodes if node.inputs} == {
-        "s/2": ("insert", ("b", "a")),
-        "s/3": ("insert", ("s/2", "c")),
-        "s/4": ("mate", ("s/3", "d")),
-        "s": ("insert", ("e", "s/4")),
-    }
-
-
-@given(sizes, seeds, shapes)
-def test_forms_as_they_are_written_change_nothing(size: int, seed: int, shape: str) -> None:
-    pag = random_pag(size, seed, shape)
-    plan = Plan(written_forms(task_of(pag)))
-    assert expand(pag, TEMPLATES, plan) == expand(pag, TEMPLATES)
-
-
 def test_a_form_that_is_refused_is_not_chosen() -> None:
     pag = table_pag("s", ("s", "mate", "a b", {}), *((x, "atomic", "", {}) for x in "ab"))
     task = task_of(pag, {})
     assert best_forms(task)[0]["s"] != THIRD
     refused = frozenset({("s", 0), ("s", 1)})
     assert best_forms(replace(task, refused=refused))[0] == {"s": THIRD}
-
-
-def test_both_axes_are_looked_at_as_matings_does() -> None:
-    project = read(EXAMPLES / "truck.pag")
-    found = admitted(expand(project.pag, project.templates), project.product)
-    assert project.matings is not None
-    for mating in project.matings.all:
-        assert found[mating.label].slides[mating.approach.axis] == mating.slide
-
-
-def test_a_template_without_a_robot_to_spare_is_never_changed(
-    templates: dict[str, Template],
-) -> None:
-    bare = Project(read(EXAMPLES / "paper.pag").pag, templates)
-    seen = looked_at(bare, Aim(robots="least"))
-    assert {tuple(one.forms) for one in seen} == {()}
-
-
-def looked_at(project: Project, aim: Aim) -> list[Candidate]:
-    """All candidates of a search."""
-    seen: list[Candidate] = []
-    Search(project, aim).look(lambda one, _: seen.append(one))
-    return seen
-
-
-@pytest.fixture
-def templates() -> dict[str, Template]:
-    """Those of the package, but mate as it was."""
-    return {name: replace(t, instead="") for name, t in TEMPLATES.items()}
 
 
 def test_so_many_robots_come_before_hands_for_all_labels() -> None:
@@ -202,30 +84,6 @@ def test_so_many_robots_come_before_hands_for_all_labels() -> None:
     assert asked.rank(17, 9.0, bare=2) < asked.rank(18, 8.0, bare=3)
     least = Aim(robots="least")
     assert least.rank(28, 5.0) < least.rank(18, 9.0, bare=3)
-
-
-@pytest.mark.parametrize("robots", [3, 4])
-def test_only_what_can_be_the_best_is_certified(robots: int) -> None:
-    """A candidate with too many robots is not, nor one whose draft is slower than the best so far.
-    A draft is a lower bound of its layout, so the best is as if all were certified."""
-    search, before = Search(read(EXAMPLES / "paper.pag"), Aim(robots)), dict[int, Candidate]()
-    seen = list[tuple[Candidate, Candidate, bool]]()
-
-    def look(one: Candidate, best: Candidate) -> None:
-        first = id(one.project) not in before
-        so_far = before.setdefault(id(one.project), seen[-1][1] if seen else best)
-        certified = first and "layout" in one.project.__dict__
-        if certified:
-            assert one.robots <= robots
-            assert so_far.robots > robots or one.least < so_far.seconds
-        seen.append((one, best, certified))
-
-    search.look(look)
-    count = sum(certified for *_, certified in seen)
-    assert 0 < count < len(before)
-    few = [one for one, *_ in seen if one.robots <= robots and one.has_layout]
-    assert all(one.least <= one.seconds + 1e-6 for one in few)
-    assert search.rank(search.best) == min(map(search.rank, few))
 
 
 @pytest.mark.slow
@@ -249,32 +107,141 @@ def test_hands_are_given_up_for_the_robots_that_are_asked_for(run: Terminal) -> 
     assert "NoGrip" in {warning["code"] for warning in done.json["warnings"]}
 
 
-def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
-    paper = EXAMPLES / "paper.pag"
-    done = run("run", paper, "--robots", "4", "--units", "4", "--json")
-    assert done.status == 0, done.err
-    assert done.json["robots"] == 4
-    assert done.json["cycle_time_s"] == pytest.approx(done.json["predicted_cycle_time_s"], rel=0.02)
-    few = run("check", paper, "--robots", "2", "--json")
-    assert few.codes == ["TooFewRobots"]
-    (error,) = few.json["errors"]
-    assert error["message"] == "'sub3' needs at least 3 robots: 2 carriers and 1 tool"
-    least = run("check", paper, "--robots", "least", "--json").json
-    assert least["robots"] == 3
-    assert least["gear_train"]
-    assert least["live"]
+FEW, MANY = (4, 8, 10, 16, 101, 691), (7, *range(100, 1100))
+"""Seeds: the few have forms, robots with several tours, and branches that are there twice."""
 
 
-def test_from_python() -> None:
-    pag = factory.load_pag(EXAMPLES / "paper.pag")
-    assert [len(factory.compile(pag, robots=n).robots) for n in (3, 4, 5, 6, None)] == [
-        3,
-        4,
-        5,
-        6,
-        6,
+def random_plan(project: Project, rng: random.Random) -> Project:
+    """A product by some plan: forms, lines, and a branch that is there several times."""
+    free = [
+        label
+        for node in project.pag.nodes
+        if project.templates[node.operation].instead and len(node.inputs) > 1
+        for label in joins(node)
     ]
-    assert factory.compile(pag) == read(EXAMPLES / "paper.pag", settings=Settings()).plain
+    if rng.random() < 0.7:
+        forms = {label: rng.choice((THIRD, 0, 1)) for label in free if rng.random() < 0.5}
+        project = project.with_plan(Plan(forms))
+    base = judged(project.compiled, project.product)
+    if rng.random() < 0.7:
+        boxes = payload_boxes(base, project.product)
+        shift = Shift.of(base, project.catalogue, boxes, Pace.of(project.settings))
+        fillings = [f for f in islice(shift.fillings(1.3), 40) if shift.lines(f)]
+        if fillings:
+            project = project.with_plan(shift.plan(rng.choice(fillings)))
+    labels = [
+        x for robot in project.planned.robots[1:] for x in project.planned.deliveries(robot.index)
+    ]
+    for label in rng.sample(labels, min(2, len(labels))):
+        try:
+            return with_branches(project, [(label, rng.choice((2, 3)))])
+        except InputError:
+            continue
+    return project
+
+
+def check(seed: int, folder: Path) -> None:
+    """One random product by one random plan."""
+    file, rng = folder / "product.pag", random.Random(seed)
+    file.write_text(random_product(seed))
+    project = random_plan(read(file, (), Settings(timestep=0.001, substeps=1)), rng)
+    try:
+        layout = project.layout
+    except RunError as error:
+        assert error.diagnostics[0].code == "Layout"
+        return
+    factory = layout.factory
+    assert verify(factory.net).holds
+    truth = explored(marked(factory.net), 500) if len(factory.operations) < 12 else None
+    assert truth is None or truth.behaviour == (True, True, True)
+    when = {number: n for n, number in enumerate(factory.order)}
+    for robot in factory.robots:
+        steps = [when[number] for number in robot.operations]
+        assert steps == sorted(steps), "one unit is made operation by operation"
+    assert certify(layout).holds
+    units = 6 * factory.period
+    request = RunRequest("ideal", units, settings=project.settings, shown=False)
+    run = Simulation(layout, request).run()
+    assert run.refines_net and run.products == units
+    ticks = max(len(robot.operations) for robot in factory.robots) / factory.period
+    assert run.cycle_time_s == pytest.approx(
+        run.predicted_cycle_time_s, rel=0.005, abs=ticks * project.settings.tick
+    )
+    for path, content in plan_files(project, folder).items():
+        path.write_bytes(content)
+    kept, said = read_plan(folder / PLAN_NAME), list[Diagnostic]()
+    again = kept.project(kept.settings, kept.ground, said.append)
+    assert LayoutTable.of(again.layout) == LayoutTable.of(layout) and not said
+    assert again.layout.factory == factory and again.layout.certificate == layout.certificate
+    anew = replace(again, laid=None).layout
+    assert anew.factory == factory
+    assert (anew.guidepaths, anew.visits) == (layout.guidepaths, layout.visits)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", MANY)
+def test_a_thousand_plans(seed: int, tmp_path: Path) -> None:
+    check(seed, tmp_path)
+
+
+def test_a_plan_with_other_tours_is_refused() -> None:
+    project = read("examples/paper.pag")
+    with pytest.raises(InputError, match="6 tours"):
+        shared(project.compiled, Plan(turns=((0, 1),)), project.catalogue)
+    with pytest.raises(InputError, match="robots are named"):
+        shared(project.compiled, Plan(turns=((0, 1, 2, 3, 4, 9),)), project.catalogue)
+
+
+PRODUCTS = ("truck", "lamp", "stool", "shelf")
+LONG = ("chair", "gearbox", "chest")
+FILLINGS = 12
+"""So many ways to fill lines are looked at."""
+
+
+def digest(factory: Factory) -> str:
+    """A digest of all that is compiled: operations, programs, net, parents, period."""
+    robots = [(r.name, r.type, r.operations) for r in factory.robots]
+    operations = [
+        (o.label, o.template.name, o.robots, o.before, o.after, o.dwell, o.turn)
+        for o in factory.operations
+    ]
+    net = factory.net
+    places = [(p.left, p.right, p.name, p.mode, p.label) for p in net.threaded.net.places]
+    gears = [(g.robot, g.type, g.places, g.transitions) for g in net.gears]
+    kept = robots, operations, places, gears, factory.parents, factory.period, net.initial
+    return hashlib.sha256(repr(kept).encode()).hexdigest()[:16]
+
+
+def variants(file: Path) -> Iterator[tuple[str, Factory]]:
+    """The variants of a product's factory, by name."""
+    project = read(file)
+    base, catalogue = judged(project.compiled, project.product), project.catalogue
+    yield "as written", base
+    shift = Shift.of(base, catalogue, payload_boxes(base, project.product), Pace())
+    every = dict.fromkeys(map(shift.lines, islice(shift.fillings(1.3), 60)))
+    plans = [fold(base, lines, catalogue) for lines in islice(filter(None, every), FILLINGS)]
+    folds = [shared(base, plan, catalogue) for plan in plans]
+    for number, folded in enumerate(folds):
+        yield f"fold {number}", folded
+    for name, factory in (("written", base), *((f"fold {n}", f) for n, f in enumerate(folds[-2:]))):
+        for robot in factory.robots[1:]:
+            for label in factory.deliveries(robot.index)[:1]:
+                for k in (2, 3):
+                    try:
+                        made = shared(base, in_parallel(factory, [(label, k)]), catalogue)
+                    except InputError:
+                        continue
+                    if on_stems(made)[0] is not made:  # tees have tests of their own
+                        continue
+                    yield f"{name}, {label} = {k}", made
+
+
+@pytest.mark.parametrize(
+    "product", [*PRODUCTS, *(pytest.param(name, marks=pytest.mark.slow) for name in LONG)]
+)
+def test_every_variant_is_as_it_was(product: str, golden: Callable[[str, str], None]) -> None:
+    lines = [f"{digest(made)} {name}" for name, made in variants(Path(f"examples/{product}.pag"))]
+    golden(f"assignments/{product}.txt", "\n".join(lines) + "\n")
 
 
 def test_the_cycle_of_who_delivers_has_both_ways_and_a_loss() -> None:

@@ -3,9 +3,7 @@ is told in sentences of ours."""
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +19,6 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError
 from factory.theory.problem.pag import PAG
-from tests.command_line import Terminal
 from tests.layout_values import table_pag
 
 EDGE = 0.1
@@ -32,13 +29,6 @@ def product(folder: Path, name: str, content: bytes | str) -> Product:
     (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
     pag = table_pag("p", ("p", "atomic", "", {"mesh": name}))
     return product_geometry(PAG(pag.root, pag.nodes, folder=str(folder)))
-
-
-def tree(folder: Path, name: str, content: bytes | str) -> Path:
-    """A tree of one part, with this mesh."""
-    (folder / name).write_bytes(content.encode() if isinstance(content, str) else content)
-    (folder / "t.json").write_text(f'{{"children": [{{"part": "{name}"}}]}}')
-    return folder / "t.json"
 
 
 def cube() -> trimesh.Trimesh:
@@ -80,21 +70,6 @@ SEAMED: dict[str, Callable[[trimesh.Trimesh], bytes | str]] = {
 }
 
 
-# --- closed -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", SEAMED)
-def test_seams_of_texture_and_normals_leave_a_mesh_closed(tmp_path: Path, name: str) -> None:
-    """Mass, centre and inertia are those of the shape, not of its hull."""
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
-    found = product(tmp_path, name, SEAMED[name](tube))
-    solid = found.solids["p"]
-    assert found.warnings == ()
-    assert solid.mass == pytest.approx(1000 * tube.volume, rel=1e-5)
-    assert solid.inertia == pytest.approx(1000 * tube.moment_inertia, abs=1e-7)
-    assert solid.mesh is not None and len(solid.mesh.faces) == len(tube.faces)
-
-
 @pytest.mark.parametrize("name", SEAMED)
 def test_bodies_that_touch_are_kept_apart_behind_seams(tmp_path: Path, name: str) -> None:
     """An L of two boxes that share a corner each: in one OBJ, and as two meshes of a GLB."""
@@ -116,16 +91,6 @@ def test_bodies_that_touch_are_kept_apart_behind_seams(tmp_path: Path, name: str
     assert found.mass == pytest.approx(3.0, rel=1e-5)
 
 
-def test_bodies_that_touch_all_over_are_closed(tmp_path: Path) -> None:
-    """Of an STL, where the corners of both are one: their mass is not that of the hull."""
-    boxes = [cube(), cube().apply_translation((EDGE, 0, 0)), cube().apply_translation((0, EDGE, 0))]
-    found = product(tmp_path, "m.stl", trimesh.util.concatenate(boxes).export(file_type="stl"))
-    assert found.warnings == () and found.mass == pytest.approx(3.0, rel=1e-5)
-
-
-# --- mended -----------------------------------------------------------------------------------
-
-
 def to_and_fro() -> trimesh.Trimesh:
     mesh = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
     mesh.faces[::3] = mesh.faces[::3, ::-1]
@@ -135,34 +100,6 @@ def to_and_fro() -> trimesh.Trimesh:
 def inside_out() -> trimesh.Trimesh:
     mesh = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
     mesh.invert()
-    return mesh
-
-
-def one_of_two_inside_out() -> trimesh.Trimesh:
-    return trimesh.util.concatenate([cube().apply_translation((0.3, 0, 0)), inside_out()])
-
-
-def wire_inside_out() -> trimesh.Trimesh:
-    """A frame of wire: 1 part in 200,000 of its box."""
-    rods = []
-    for way in range(3):
-        size = np.full(3, 2e-4)
-        size[way] = EDGE
-        rods.append(trimesh.creation.box(size).apply_translation(EDGE * np.eye(3)[way - 1]))
-    mesh = trimesh.util.concatenate(rods)
-    mesh.invert()
-    return mesh
-
-
-def half_inside_out() -> trimesh.Trimesh:
-    mesh = cube().apply_translation((0.3, 0, 0))
-    mesh.invert()
-    return trimesh.util.concatenate([cube(), mesh])
-
-
-def with_a_hole() -> trimesh.Trimesh:
-    mesh = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24)
-    mesh.update_faces(np.arange(len(mesh.faces)) != 7)
     return mesh
 
 
@@ -203,10 +140,6 @@ TUBE = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=24).volume
 MENDED: tuple[tuple[Callable[[], trimesh.Trimesh], str, float], ...] = (
     (to_and_fro, "had triangles of inconsistent orientation", TUBE),
     (inside_out, "was inside out", TUBE),
-    (one_of_two_inside_out, "was inside out", TUBE + EDGE**3),
-    (half_inside_out, "was inside out", 2 * EDGE**3),
-    (wire_inside_out, "was inside out", 3 * EDGE * 4e-8),
-    (with_a_hole, "had slivers or small holes", TUBE),
     (with_a_sliver, "had slivers or small holes", EDGE**3),
     (cracked, "had cracks", TUBE),
     (two_sided, "had duplicate triangles", EDGE**3),
@@ -226,42 +159,22 @@ def test_faces_of_a_solid_are_zipped_where_they_divide_an_edge_differently() -> 
     assert zipped(vertices, open_box) is open_box
 
 
-@pytest.mark.parametrize("kind", ["stl", "obj", "ply", "glb"])
 @pytest.mark.parametrize(
     ("make", "was", "volume"), MENDED, ids=lambda x: getattr(x, "__name__", "")
 )
 def test_what_is_nearly_closed_is_mended(
-    tmp_path: Path, make: Callable[[], trimesh.Trimesh], was: str, volume: float, kind: str
+    tmp_path: Path, make: Callable[[], trimesh.Trimesh], was: str, volume: float
 ) -> None:
     mesh = make()
-    drawn = mesh.copy().apply_transform(Y_UP) if kind == "glb" else mesh
-    content = drawn.export(file_type=kind, **({"digits": 12} if kind == "obj" else {}))
-    found = product(tmp_path, f"m.{kind}", content)
+    content = mesh.copy().apply_transform(Y_UP).export(file_type="glb")
+    found = product(tmp_path, "m.glb", content)
     (warning,) = found.warnings
-    assert warning.message == f"m.{kind} {was}; it was repaired" and not warning.hint
+    assert warning.message == f"m.glb {was}; it was repaired" and not warning.hint
     solid = found.solids["p"]
     assert solid.mass == pytest.approx(1000 * volume, rel=1e-4)
     assert solid.mesh is not None
     assert solid.mesh.vertices.min(axis=0) == pytest.approx(mesh.bounds[0], abs=1e-7)
     assert solid.mesh.vertices.max(axis=0) == pytest.approx(mesh.bounds[1], abs=1e-7)
-
-
-def test_bodies_that_touch_are_turned_one_by_one(tmp_path: Path) -> None:
-    """A ring of wedges, all inside out: its pieces are the wedges, as if they were not."""
-    turns = np.linspace(0, 2 * np.pi, 25)
-    wedges = []
-    for a, b in pairwise(turns):
-        flat = [(r * np.cos(t), r * np.sin(t)) for t in (a, b) for r in (0.05, 0.1)]
-        wedges.append(
-            trimesh.convex.convex_hull(np.array([(*p, z) for p in flat for z in (0, 0.1)]))
-        )
-    ring = trimesh.util.concatenate(wedges)
-    whole = ring.volume
-    ring.invert()
-    found = product(tmp_path, "m.obj", ring.export(file_type="obj", digits=12))
-    assert len(found.solids["p"].pieces) == 24
-    assert found.mass == pytest.approx(1000 * whole, rel=1e-6)
-    assert [w.message for w in found.warnings] == ["m.obj was inside out; it was repaired"]
 
 
 def test_a_cavity_stays_one(tmp_path: Path) -> None:
@@ -282,58 +195,16 @@ def test_a_cavity_stays_one(tmp_path: Path) -> None:
     assert found.mass == pytest.approx(8000 * (volume + EDGE**3), rel=1e-5)
 
 
-def sheet() -> trimesh.Trimesh:
-    """A shell like a gutter, without thickness."""
-    turns = np.linspace(0, np.pi, 13)
-    points = np.array([(0.2 * np.cos(t), y, 0.2 * np.sin(t)) for t in turns for y in (0, 0.5)])
-    faces = [f for k in range(0, 24, 2) for f in ([k, k + 1, k + 2], [k + 1, k + 3, k + 2])]
-    return trimesh.Trimesh(points, faces, process=False)
-
-
-def two_sided_sheet() -> trimesh.Trimesh:
-    mesh = sheet()
-    faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1]])
-    return trimesh.Trimesh(mesh.vertices, faces, process=False)
-
-
-def shelf() -> trimesh.Trimesh:
-    """Five sides of a box, of single sheets."""
-    mesh = cube()
-    mesh.update_faces((mesh.face_normals != (0, 0, 1)).any(axis=1))
-    return mesh
-
-
-@pytest.mark.parametrize("make", [sheet, two_sided_sheet, shelf])
-def test_sheets_are_not_made_solid(tmp_path: Path, make: Callable[[], trimesh.Trimesh]) -> None:
-    """What has no thickness has its hull, as before: a lid on it would be invented."""
-    mesh = make()
-    found = product(tmp_path, "m.stl", mesh.export(file_type="stl"))
-    (warning,) = found.warnings
-    assert "its convex hull is used instead" in warning.message
-    assert found.mass == pytest.approx(1000 * mesh.convex_hull.volume, rel=1e-5)
-
-
-# --- broken -----------------------------------------------------------------------------------
-
 FAULTS = (
-    ("m.obj", "", "it is empty"),
     ("m.obj", "# nothing\n", f"it is not {EXPECTED['.obj']}"),
-    ("m.obj", "v 0 0 0\n", f"it has no triangles; it should be {EXPECTED['.obj']}"),
-    ("m.obj", "v 1 2\nf 1 1 1\n", "line 1 has no vertex: 'v x y z' takes three numbers"),
-    ("m.obj", "v 0 0 1\n\nv 0 nan 0\nf 1 1 2\n", "line 3 has a vertex that is not finite: 0 nan 0"),
-    ("m.obj", "v 0 0 -inf\nf 1 1 1\n", "line 1 has a vertex that is not finite: 0 0 -inf"),
     (
         "m.obj",
         "v 0 0 1\nf 1 1\n",
         "line 2 has no face: 'f 1 2 3' takes three vertices or more, by number",
     ),
     ("m.obj", "v 0 0 1\nf 1 1 0\n", "line 2 has a face with a vertex that does not exist: 0"),
-    ("m.obj", "v 0 0 1\nf 1 1 -2\n", "line 2 has a face with a vertex that does not exist: -2"),
     ("m.obj", "v 0 0 1\nf 1 1 7\n", "a face has the vertex 7, but there are 1"),
-    ("m.stl", "no mesh", f"it has no triangles; it should be {EXPECTED['.stl']}"),
     ("m.stl", b"\xff" * 90, f"it is not {EXPECTED['.stl']}"),
-    ("m.ply", "ply\n", f"it is not {EXPECTED['.ply']}"),
-    ("m.glb", b"glTF\2\0\0\0", f"it is not {EXPECTED['.glb']}"),
 )
 
 
@@ -346,76 +217,9 @@ def test_what_is_wrong_with_a_file_is_a_sentence(
     assert [d.message for d in caught.value.diagnostics] == [f"cannot read '{name}': {why}"]
 
 
-@pytest.mark.parametrize(("name", "content", "why"), FAULTS[4:5] + FAULTS[-1:])
-def test_import_says_the_same(
-    run: Terminal, tmp_path: Path, name: str, content: str | bytes, why: str
-) -> None:
-    done = run("import", tree(tmp_path, name, content), "-o", tmp_path / "out", "--json")
-    assert [e["message"] for e in done.json["errors"]] == [f"cannot read '{name}': {why}"]
-
-
 def test_a_vertex_that_is_not_finite_is_told_of_any_format() -> None:
     mesh = cube()
     mesh.vertices[3] = np.nan
     for kind in ("stl", "ply", "glb"):
         with pytest.raises(UnreadableMesh, match="vertices that are not finite"):
             read_mesh(bytes(mesh.export(file_type=kind)), f".{kind}")
-
-
-def test_an_obj_may_have_what_others_write() -> None:
-    """Polygons, numbers from the end, comments, colours, continued lines, carriage returns."""
-    text = "v 0 0 0 1 0 0\nv 1 0 0 # x\nv 1 1 \\\n 0\nv 0 1 0\nvn 0 0 1\nf -4 -3//1 3/2/1 4\n"
-    vertices, faces = read_mesh(text.replace("\n", "\r\n").encode(), ".obj").merged()
-    assert vertices.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-    assert faces.tolist() == [[0, 1, 2], [0, 2, 3]]
-
-
-def damaged(content: bytes, seed: int) -> bytes:
-    """A file cut off, with bytes changed, missing or put in between."""
-    rng, made = np.random.default_rng(seed), bytearray(content)
-    start, end = sorted(rng.integers(len(content), size=2))
-    if seed % 4 == 0:
-        del made[start:]
-    elif seed % 4 == 1:
-        for at in rng.integers(len(content), size=1 + seed % 5):
-            made[at] = rng.integers(256)
-    elif seed % 4 == 2:
-        del made[start:end]
-    else:
-        made[start:start] = rng.integers(256, size=20, dtype=np.uint8).tobytes()
-    return bytes(made)
-
-
-SENTENCES = (
-    "it is empty",
-    "it has no triangles; it should be ",
-    "it is not a",
-    "it has vertices that are not finite",
-    "a triangle refers to a vertex that does not exist",
-    "a face has the vertex ",
-    "line ",
-)
-"""How what is wrong with a mesh begins."""
-
-
-@pytest.mark.parametrize("kind", ["obj", "stl", "stl_ascii", "ply", "glb"])
-def test_damaged_files_are_told_in_our_words(
-    tmp_path: Path, kind: str, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """200 ways to damage a file: it is read, or refused in a sentence; no library speaks."""
-    tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=8)
-    sound = seamed_obj(tube) if kind == "obj" else tube.export(file_type=kind)
-    content = sound.encode() if isinstance(sound, str) else bytes(sound)
-    name, refused = f"m.{kind[:3]}", 0
-    for seed in range(200):
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            try:
-                product(tmp_path, name, damaged(content, seed))
-            except InputError as error:
-                refused += 1
-                for diagnostic in error.diagnostics:
-                    head, _, why = diagnostic.message.partition(f"cannot read '{name}': ")
-                    assert why.startswith(SENTENCES) or head.startswith("'p' reaches further")
-    assert refused > 50
-    assert capfd.readouterr() == ("", "")

@@ -6,23 +6,23 @@ import json
 import re
 import signal
 import socket
-import sys
 from collections.abc import Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from http.client import HTTPConnection
+from importlib import resources
+from math import inf
 from subprocess import PIPE
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from factory.apps.deviations import KINDS, Campaign, Deviation, FaultInjector
 from factory.apps.live import Server, Session
-from factory.apps.live.commands import FAULTS, KEYS, Command, command_of
+from factory.apps.live.commands import FAULTS, KEYS, LASTS, Command, command_of
 from factory.apps.live.interventions import Interventions
+from factory.apps.live.outages import Outages
 from factory.apps.live.page import page, stage_of
-from factory.apps.monitor import beside
-from factory.apps.report.drawings import floor_plan, labels_of
 from factory.engine.mjcf import names
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
@@ -31,7 +31,7 @@ from factory.support.errors import InputError
 from factory.theory.nets.replay import replay
 from tests.command_line import Terminal, started
 from tests.layout_values import paper_layout
-from tests.live_sessions import Running, a_session
+from tests.live_sessions import Running
 from tests.paths import PAPER
 
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
@@ -39,22 +39,9 @@ websockets = pytest.importorskip("websockets.sync.client", reason="pip install w
 PARTS = ("part1", "part2", "part3")
 
 
-# --- commands ----------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("message", "command"),
-    [
-        ('{"do": "pause"}', Command("pause")),
-        ('{"do": "step", "more": 1}', Command("step")),
-        ('{"do": "speed", "factor": 0}', Command("speed", factor=0)),
-        ('{"do": "push", "robot": 5, "share": -1}', Command("push", robot=5, share=-1)),
-        ('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1)),
-        (
-            '{"do": "block", "part": "part2", "blocked": false}',
-            Command("block", part="part2", blocked=False),
-        ),
-    ],
+    [('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1))],
 )
 def test_commands_are_read(message: str, command: object) -> None:
     assert command_of(message, 6, PARTS) == command
@@ -63,22 +50,9 @@ def test_commands_are_read(message: str, command: object) -> None:
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        ("no json", "JSON object"),
         (b"\xff\xfe", "JSON object"),
         ("[1]", "JSON object"),
-        ("[" * 2000, "JSON object"),
-        ("{}", "'do' is None: there are pause"),
-        ('{"do": ["pause"]}', "there are pause"),
-        ('{"do": "explode"}', "'do' is 'explode': there are pause"),
-        ('{"do": "push", "robot": 6, "share": 1}', "'robot' of 'push' is 6: a number from 0 to 5"),
-        ('{"do": "push", "robot": true, "share": 1}', "'robot' of 'push' is True"),
-        ('{"do": "push", "robot": 1.0, "share": 1}', "'robot' of 'push' is 1.0"),
         ('{"do": "push", "robot": 1, "share": 1e9}', "'share' of 'push' is 1000000000.0: one of"),
-        ('{"do": "push", "robot": 1, "share": NaN}', "'share' of 'push' is nan"),
-        ('{"do": "slow", "robot": 1}', "'factor' of 'slow' is None: one of (0.1"),
-        ('{"do": "slow", "robot": 1, "factor": 0}', "'factor' of 'slow' is 0"),
-        ('{"do": "speed", "factor": "2"}', "'factor' of 'speed' is '2'"),
-        ('{"do": "block", "part": "sub1", "blocked": true}', "'part' of 'block' is 'sub1'"),
         ('{"do": "block", "part": "part1", "blocked": 1}', "true or false"),
     ],
 )
@@ -86,67 +60,6 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
     with pytest.raises(ValueError) as error:
         command_of(message, 6, PARTS)
     assert words in str(error.value)
-
-
-# --- interventions ------------------------------------------------------------------------------
-
-
-def moved(share: float) -> float:
-    """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
-    simulation = Simulation(paper_layout(), RunRequest(units=10))
-    interventions, world = Interventions(simulation), simulation.physical
-    interventions.block("part1")
-    slide = world.motion.axes.qpos[0]
-    start = float(world.d.qpos[slide])
-    found = [0.0]
-    for tick in range(100):
-        if tick == 10:
-            interventions.push(0, share, 0.3)
-        simulation.supervisor.step()
-        found.append(float(world.d.qpos[slide]) - start)
-    assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
-    push = interventions.pushed
-    assert push is not None and push.robot == 0
-    assert push.force == share * world.m.actuator_forcerange[world.motion.axes.actuator[0], 1]
-    assert push.gave == pytest.approx(abs(max(found, key=abs)), rel=0.1)
-    return max(found, key=abs)
-
-
-def test_a_pushed_robot_gives_way_and_comes_back() -> None:
-    """Robots wait at their B ends, and A, where they deliver, is 0."""
-    assert moved(1.0) < 2 * moved(0.5) < 0 < moved(-1.0)
-
-
-@pytest.mark.parametrize("pushed", [False, True])
-def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
-    """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
-    and makes its products. Without pushes, which the monitor cannot tell from faults, the monitor
-    agrees."""
-    simulation = Simulation(paper_layout(), RunRequest(units=12))
-    interventions, watcher = Interventions(simulation), beside(simulation)
-    draw, ticks = np.random.default_rng(5), 0
-
-    def act(state: State) -> None:
-        nonlocal ticks
-        ticks += 1
-        watcher.observe(state)
-        if ticks > 2500:
-            for part in PARTS:
-                interventions.free(part)
-        elif ticks % 40 == 0:
-            robot, part = int(draw.integers(6)), PARTS[draw.integers(3)]
-            if pushed:
-                interventions.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
-            interventions.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
-            (interventions.block if draw.random() < 0.5 else interventions.free)(part)
-
-    run = simulation.run([act])
-    assert run.products == 12 and run.trouble is None and run.refines_net
-    assert pushed or watcher.report().refines_net, watcher.report().violations[:3]
-    assert run.physics is not None and run.physics.product_error_max_mm < 0.1
-
-
-# --- a session ---------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -178,12 +91,6 @@ def test_pause_step_and_play(running: Running) -> None:
     running.until(lambda f: f.time > after.time + 0.2)
 
 
-def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
-    for speed in (1.0, 2.0, 0.25):
-        running.session.send(Command("speed", factor=speed))
-        running.until(lambda f, s=speed: f.speed == s and f.pace == pytest.approx(s, rel=0.25))
-
-
 def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> None:
     send = running.session.send
     send(Command("speed", factor=0.0))
@@ -199,27 +106,12 @@ def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> 
     running.until(lambda f: f.products > quiet.products + 1 and not f.note)
 
 
-def test_restart(running: Running) -> None:
-    send = running.session.send
-    send(Command("speed", factor=0.0))
-    send(Command("slow", robot=2, factor=0.5))
-    before = running.until(lambda f: f.count > 20 and f.slowed == {2: 0.5})
-    send(Command("pause"))
-    send(Command("restart"))
-    fresh = running.until(lambda f: f.run == 1)
-    assert (fresh.time, fresh.count, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
-    assert running.session.fired(before.run, 0, 5) == []
-
-
 def test_it_says_when_the_engine_gives_up(running: Running) -> None:
     running.session.simulation.world.d.qvel[:] = np.nan
     note = running.until(lambda f: bool(f.note)).note
     assert "unstable" in note and "restart it" in note
     running.session.send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
-
-
-# --- a server ----------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -251,16 +143,6 @@ def socket_of(server: Server, **options: Any) -> Any:
 def unpacked(message: bytes) -> tuple[dict[str, Any], np.ndarray]:
     length = int.from_bytes(message[:4], "little")
     return json.loads(message[4 : 4 + length]), np.frombuffer(message[4 + length :], "<f4")
-
-
-def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
-    status, body, headers = asked(server, path_of(server))
-    assert (status, body) == (200, "<p>the page")
-    assert headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
-    for path in ("/", "/live", "/../etc/passwd", path_of(server)[:-2] + "x/", "/" + "x" * 500):
-        assert asked(server, path)[0] == 404
-    with Server(a_session(True), b"") as other:
-        assert path_of(other) != path_of(server)
 
 
 def test_other_names_and_other_pages_are_refused(server: Server) -> None:
@@ -305,17 +187,6 @@ def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) ->
     running.until(lambda f, n=running.session.frame.number: f.number > n)
 
 
-def test_every_firing_is_told_once(server: Server, running: Running) -> None:
-    with socket_of(server) as watcher:
-        running.session.send(Command("speed", factor=0.0))
-        told: list[tuple[float, int]] = []
-        while len(told) < 150:
-            frame, _ = unpacked(watcher.recv(10))
-            told += map(tuple, frame["fired"])
-            assert len(told) == frame["count"]
-    assert told == running.session.fired(0, 0, len(told))
-
-
 def test_it_listens_on_loopback_only(running: Running) -> None:
     for host in ("0.0.0.0", "::", "192.0.2.1", "example.org"):
         with pytest.raises(InputError, match="other machines"):
@@ -344,18 +215,6 @@ def test_the_page_names_every_robot_and_part(running: Running) -> None:
     assert "connect-src 'self'" in made and 'class="station"' in made
 
 
-def test_robots_are_drawn_in_one_piece() -> None:
-    """A carriage is 60 mm wide; the finger is on its arm."""
-    layout = paper_layout()
-    drawn = floor_plan(stage_of(Simulation(layout)), labels_of(layout.factory))
-    groups = next(g for g in ElementTree.fromstring(drawn) if g.get("class") == "robots")
-    for path, group in zip(layout.guidepaths, groups, strict=True):
-        for shape in group:
-            corners = [tuple(map(float, p.split(","))) for p in shape.get("points", "").split()]
-            assert len(corners) >= 4
-            assert max(np.hypot(x, y) for x, y in corners) <= 1e3 * path.reach + 31
-
-
 def test_a_push_answers() -> None:
     """Which robot, with what force, how far it gave way; while the factory stands, that it will."""
     running = Running()
@@ -371,9 +230,6 @@ def test_a_push_answers() -> None:
 
 
 ANSWER = r"r3 was pushed back with \d+ N and displaced by [1-9]\d*\.\d mm"
-
-
-# --- the command -------------------------------------------------------------------------------
 
 
 def test_the_command_serves_until_it_is_interrupted() -> None:
@@ -399,17 +255,159 @@ def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch)
     assert "--expose" in done.json["errors"][0]["hint"]
 
 
-def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("factory.pipeline.read", None)
-    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
-    done = run("view", PAPER, "--json")
-    assert done.status == 3 and done.codes == ["Missing"]
-    assert done.json["errors"][0]["hint"] == "pip install 'klavins-factory[live]'"
-
-
 def test_every_key_of_a_command_is_checked() -> None:
     keys = {key for keys in (*KEYS.values(), *FAULTS.values()) for key in keys}
     assert keys == {field.name for field in fields(Command)} - {"do"}
+
+
+CAMPAIGN = Campaign(clear=1.0, spares=1, swap=2.0)
+DROPS = replace(CAMPAIGN, faults=(Deviation("drop", robot="r6", at=5.0),))
+
+
+@pytest.fixture
+def dropping() -> Iterator[Running]:
+    made = Running(campaign=DROPS)
+    yield made
+    made.close()
+
+
+def test_every_command_to_fail_is_a_kind_of_fault() -> None:
+    assert KINDS.keys() >= FAULTS.keys()
+
+
+def test_every_command_strikes_what_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The robot, for as long as the page says."""
+    struck = list[Deviation]()
+    monkeypatch.setattr(FaultInjector, "strike", lambda _, fault, now: struck.append(fault))
+    dropping = Running(campaign=CAMPAIGN)
+    try:
+        for name in FAULTS:
+            dropping.session.send(Command(name, robot=2))
+        dropping.until(lambda f: len(struck) == len(FAULTS))
+    finally:
+        dropping.close()
+    assert struck == [
+        Deviation("down", robot="r3", at=0.0, seconds=LASTS),
+        Deviation("dead", robot="r3", at=0.0),
+    ]
+
+
+def test_a_run_that_is_made_to_fail_goes_on() -> None:
+    simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
+    hands, ticks = Interventions(simulation, CAMPAIGN), 0
+
+    def act(_: State) -> None:
+        nonlocal ticks
+        ticks += 1
+        match ticks:
+            case 50:
+                hands.slow(4, 0.5)
+                hands.fail("bad_part", label="part1")
+            case 150:
+                hands.fail("drop", 5)
+            case 700:
+                hands.fail("down", 1, seconds=1.0)
+            case 900:
+                hands.slow(4, 1.0)
+                hands.fail("dead", 4)
+
+    run = simulation.run([act])
+    assert run.products == 6 and run.trouble is None and run.refines_net
+    assert hands.recovery is not None
+    report = hands.recovery.report()
+    assert report.struck == {"bad_part": 1, "drop": 1, "down": 1, "dead": 1, "slow": 2}
+    assert {one.test for one in report.found} == {"rejected", "lost", "jammed"}
+    assert report.spares == 1 and report.missed == report.false_alarms == 0
+
+
+def test_a_robot_that_is_slow_stays_slow_when_others_stand() -> None:
+    simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
+    hands = Interventions(simulation, CAMPAIGN)
+    full = simulation.limits.speed.copy()
+    hands.slow(1, 0.5)
+    hands.fail("down", 2, seconds=0.1)
+    for _ in range(3):
+        simulation.supervisor.step()
+        for act in simulation.world.hooks.ticks:
+            act()
+    assert simulation.limits.speed[2] < 1e-6
+    hands.slow(3, 0.25)
+    assert simulation.limits.speed[2] < 1e-6, "it still stands"
+    for _ in range(20):
+        simulation.supervisor.step()
+        for act in simulation.world.hooks.ticks:
+            act()
+    assert (simulation.limits.speed / full)[:4].tolist() == pytest.approx([1, 0.5, 1, 0.25])
+
+
+def test_without_a_campaign_nothing_fails() -> None:
+    hands = Interventions(Simulation(paper_layout(), RunRequest(units=1)))
+    with pytest.raises(InputError, match="does not go on after failures"):
+        hands.fail("drop", 1)
+
+
+@pytest.mark.parametrize(
+    ("outages", "told"),
+    [
+        (
+            Outages(dead={"r1": 6.2, "r4": inf}),
+            [
+                ("dead", "r1 is dead: a spare replaces it in 7 s"),
+                ("dead", "r4 is dead: nothing replaces it"),
+            ],
+        ),
+        (
+            Outages(closed=("r1",), lying=2.5, zones=((0.0, 0.0, 0.1),)),
+            [("closed", "r1 stands still: a fallen part nearby is cleared away in 3 s")],
+        ),
+        (
+            Outages(lying=0.0, zones=((0.0, 0.0, 0.1),), standing=("r1", "r2")),
+            [("closed", "a fallen part is cleared away soon"), ("standing", "r1, r2 stand still")],
+        ),
+        (
+            Outages(dark=1.2, empty={"part1": 3.0}),
+            [
+                ("dark", "all sensors are off: they return in 2 s"),
+                ("empty", "the feeder of part1 is empty: it is refilled in 3 s"),
+            ],
+        ),
+    ],
+)
+def test_what_is_out_of_order_in_words(outages: Outages, told: list[tuple[str, str]]) -> None:
+    assert [*outages.messages()] == told
+    json.dumps(outages.as_json(), allow_nan=False)
+
+
+def received(watcher: Any) -> dict[str, Any]:
+    """The next frame that a watcher gets."""
+    message = watcher.recv(10)
+    return json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+
+
+def test_with_spares_robots_can_die() -> None:
+    words = ("view", PAPER, "--spares", 1, "--swap", 30, "--port", 0, "--json")
+    with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
+        address = json.loads(process.stdout.readline())["address"].replace("http", "ws") + "live"
+        with websockets.connect(address, proxy=None) as watcher:
+            watcher.send('{"do": "speed", "factor": 0}')
+            watcher.send('{"do": "dead", "robot": 3}')
+            while not (dead := received(watcher)["outages"]["dead"]):
+                pass
+            assert dead == ["r4"]
+            while received(watcher)["outages"]["dead"]:
+                pass
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 130
+
+
+def test_every_button_sends_a_command_with_its_keys() -> None:
+    """By the text of the page's program: commands have the keys that are read, and no others."""
+    text = resources.files("factory.apps.live").joinpath("assets/live.js").read_text("utf-8")
+    found = re.findall(r"{ do: '(\w+)'((?:, \w+(?:: [^,}]+)?)*) }", text)
+    every = {**KEYS, **FAULTS}
+    assert {name for name, _ in found} >= {*FAULTS, "push", "slow", "block"}
+    for name, keys in found:
+        assert {*re.findall(r", (\w+)", keys)} == {*every[name]}, name
 
 
 def test_the_page_shows_how_far_robots_reach() -> None:

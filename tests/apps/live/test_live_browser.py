@@ -14,9 +14,6 @@ from factory.apps.live.page import page
 from tests.live_sessions import Running, a_session
 from tests.waiting import until
 
-LONG = 20.0
-"""Time limit for a browser that draws in software [s]."""
-
 
 class Watched:
     """A running factory with a page open on it."""

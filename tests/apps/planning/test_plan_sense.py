@@ -1,45 +1,265 @@
-"""Plans are what an engineer would do: twenty products with a known order, from STL files."""
+"""Plans are what an engineer would do: products with a known order, from STL files."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
+import trimesh
+from manifold3d import Manifold
 
-from factory.apps.planning.blocking import blocking
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.titles import Titles
-from factory.apps.planning.writing import Screwed, Tree, leaves, planned_product, screws_in
-from factory.floor.geometry.overlap import drawn
-from factory.floor.geometry.product import product_geometry
-from factory.floor.mating.mating import matings
+from factory.apps.planning.writing import Screwed, Tree, leaves
 from factory.pipeline import all_templates
-from factory.theory.compiler.expanding import expand
-from tests.apps.planning.test_plan_audit import LEAST, cuts, ways
-from tests.engineered_products import (
-    MADE,
-    Engineered,
-    along_x,
-    along_y,
-    box,
-    drilled,
-    numbered,
-    rod,
-    screw,
-    tube,
-    write_stl,
-)
+
+Parts = Mapping[str, Manifold]
+
+FIT = 0.15
+"""Room between parts that slide in each other [mm]."""
+
+
+@dataclass(frozen=True)
+class Engineered:
+    """Parts in place, and what an engineer knows of them: the `base`, or any of several; the pairs
+    of parts of which the first is there `before` the second comes; a name that ends in `*` means
+    all that begin so."""
+
+    parts: Parts
+    base: frozenset[str]
+    before: tuple[tuple[str, str], ...]
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs of parts, written out."""
+        return [
+            (one, other)
+            for first, then in self.before
+            for one in self._named(first)
+            for other in self._named(then)
+        ]
+
+    def _named(self, name: str) -> list[str]:
+        if not name.endswith("*"):
+            return [name]
+        return [label for label in self.parts if label.startswith(name[:-1])]
+
+
+def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> Manifold:
+    """A box that stands on a point."""
+    return Manifold.cube((x, y, z), True).translate((at[0], at[1], at[2] + z / 2))
+
+
+def rod(
+    radius: float, low: float, high: float, at: tuple[float, float] = (0, 0), sides: int = 24
+) -> Manifold:
+    """An upright round bar."""
+    return Manifold.cylinder(high - low, radius, radius, sides).translate((*at, low))
+
+
+def tube(
+    outer: float, inner: float, low: float, high: float, at: tuple[float, float] = (0, 0)
+) -> Manifold:
+    """An upright round bar with a hole."""
+    return rod(outer, low, high, at) - rod(inner, low - 1, high + 1, at)
+
+
+def along_x(body: Manifold) -> Manifold:
+    """A body that was drawn upright, with its upper end at +x."""
+    return body.rotate((0, 90, 0))
+
+
+def along_y(body: Manifold) -> Manifold:
+    """A body that was drawn upright, with its upper end at -y."""
+    return body.rotate((90, 0, 0))
+
+
+def screw(at: tuple[float, float], under: float, long: float, radius: float = 1.5) -> Manifold:
+    """A screw whose head stands at a height."""
+    head = rod(1.9 * radius, under, under + 2 * radius, at)
+    return rod(radius, under - long, under, at) + head
+
+
+def nut(at: tuple[float, float], low: float, radius: float = 1.5) -> Manifold:
+    """A nut on a height."""
+    return rod(2.1 * radius, low, low + 1.6 * radius, at, 6) - rod(radius, low - 1, low + 9, at)
+
+
+def corners(x: float, y: float) -> list[tuple[float, float]]:
+    """The four corners of a rectangle."""
+    return [(a, b) for a in (-x, x) for b in (-y, y)]
+
+
+def drilled(body: Manifold, at: list[tuple[float, float]], radius: float) -> Manifold:
+    """A body with upright holes."""
+    for place in at:
+        body = body - rod(radius, -200, 200, place)
+    return body
+
+
+def numbered(
+    name: str, make: Callable[[tuple[float, float]], Manifold], at: list[tuple[float, float]]
+) -> Parts:
+    """Copies of a part."""
+    return {f"{name}{n}": make(place) for n, place in enumerate(at, 1)}
+
+
+def instrument() -> Engineered:
+    """A battery, a board and a display in a case with a screwed lid, and a knob through it."""
+    at = corners(26, 16)
+    case = box(60, 42, 24) - box(54, 36, 24, (0, 0, 3))
+    for place in at:
+        case = case + rod(4, 3, 24, place) - rod(1.5, 8, 40, place)
+    lid = drilled(box(60, 42, 3, (0, 0, 24)), at, 1.7) - rod(5.2, 20, 40)
+    parts = {
+        "case": case,
+        "battery": box(30, 22, 6, (0, 0, 3)),
+        "board": box(38, 26, 2, (0, 0, 9)),
+        "display": box(14, 14, 8, (0, 0, 11)),
+        "lid": lid,
+        "knob": rod(5, 19.0, 27) + rod(8, 27, 33),
+        **numbered("screw", lambda p: screw(p, 27, 14), at),
+    }
+    order = (("battery", "board"), ("board", "display"), ("display", "lid"), ("lid", "screw*"))
+    return Engineered(parts, frozenset({"case"}), (*order, ("lid", "knob")))
+
+
+def flange() -> Engineered:
+    """Two plates and a gasket, bolted through, with nuts below."""
+    at = corners(18, 18)
+    plates = [drilled(box(50, 50, h, (0, 0, z)), at, 2.1) for h, z in ((8, 0), (1, 8), (6, 9))]
+    parts = dict(zip(("foot", "gasket", "cover"), plates, strict=True))
+    parts["foot"] = parts["foot"] + box(26, 26, 20, (0, 0, -20))
+    parts |= numbered("bolt", lambda p: screw(p, 15, 21, 2), at)
+    parts |= numbered("nut", lambda p: nut(p, -3.2, 2), at)
+    order = (("foot", "gasket"), ("gasket", "cover"), ("cover", "bolt*"))
+    nuts = tuple((f"bolt{n}", f"nut{n}") for n in range(1, 5))
+    return Engineered(parts, frozenset({"foot"}), (*order, *nuts))
+
+
+def keyed_shaft() -> Engineered:
+    """A shaft with a foot, a key in it, a gear over the key, a collar and a nut on top."""
+    slot = box(4, 4, 20, (8, 0, 12))
+    shaft = rod(20, 0, 8) + rod(8, 8, 46) + rod(5, 46, 60) - slot
+    key = box(6 - 2 * FIT, 4 - 2 * FIT, 20 - 2 * FIT, (9, 0, 12 + FIT))
+    gear = tube(24, 8 + FIT, 8, 34) - box(6, 4, 40, (10.5, 0, 0))
+    parts = {
+        "shaft": shaft,
+        "key": key,
+        "gear": gear,
+        "collar": tube(14, 8 + FIT, 34, 42),
+        "nut": nut((0, 0), 46, 5),
+    }
+    order = (("key", "gear"), ("gear", "collar"), ("collar", "nut"))
+    return Engineered(parts, frozenset({"shaft"}), order)
+
+
+def hinge() -> Engineered:
+    """Two leaves and a pin through their knuckles."""
+
+    def knuckle(low: float, high: float) -> Manifold:
+        return along_x(tube(5, 2.5 + FIT, low, high))
+
+    left = box(60, 30, 4, (0, -18, -5)) + knuckle(-30, -10.2) + knuckle(10.2, 30)
+    right = box(60, 30, 4, (0, 18, -5)) + knuckle(-10, 10)
+    left = left - box(20.4, 12, 12, (0, 0, -6)) - along_x(rod(2.5 + FIT, -40, 40))
+    right = right - box(20, 11, 12, (-20.2, 0, -6)) - box(20, 11, 12, (20.2, 0, -6))
+    right = right - along_x(rod(2.5 + FIT, -40, 40))
+    pin = along_x(rod(2.5, -30, 31) + rod(4.5, 31, 34))
+    order = (("left", "pin"), ("right", "pin"))
+    return Engineered(
+        {"left": left, "right": right, "pin": pin}, frozenset({"left", "right"}), order
+    )
+
+
+def piston() -> Engineered:
+    """A rod in a piston, held by its pin; both in a cylinder with a screwed head."""
+    at = corners(19, 19)
+    block = drilled(box(50, 50, 70), at, 0.1) - rod(15 + FIT, 6, 90) - box(14, 14, 90)
+    for place in at:
+        block = block - rod(1.5, 50, 80, place)
+    across = along_x(rod(3 + FIT, -40, 40)).translate((0, 0, 50))
+    piston_ = rod(15, 40, 62) - box(8, 12, 18, (0, 0, 39)) - across
+    conrod = box(8 - 2 * FIT, 8, 50, (0, 0, 5)) - across
+    pin = along_x(rod(3, -12, 12)).translate((0, 0, 50))
+    head = drilled(box(50, 50, 8, (0, 0, 70)), at, 1.7)
+    parts = {"block": block, "piston": piston_, "conrod": conrod, "pin": pin, "head": head}
+    parts |= numbered("screw", lambda p: screw(p, 78, 22), at)
+    order = (("piston", "pin"), ("conrod", "pin"), ("pin", "head"), ("head", "screw*"))
+    return Engineered(parts, frozenset({"block"}), order)
+
+
+def cabinet() -> Engineered:
+    """Two drawers, with knobs, in a body that is open in front, and a top on four dowels."""
+    body = box(60, 50, 62) - box(54, 50, 26, (0, -3, 4)) - box(54, 50, 26, (0, -3, 33))
+    at = corners(26, 20)
+    for place in at:
+        body = body - rod(2, 59.5, 70, place)
+    parts = {"body": drilled(body, [], 1)}
+    for n, z in enumerate((4, 33), 1):
+        drawer = box(54 - 2 * FIT, 46, 22, (0, -2, z)) - box(48, 40, 22, (0, -2, z + 3))
+        parts[f"drawer{n}"] = drawer - along_y(rod(2 + FIT, 15, 40)).translate((0, 0, z + 11))
+        grip = along_y(rod(2, 19, 25) + rod(5, 25, 31)).translate((0, 0, z + 11))
+        parts[f"knob{n}"] = grip
+    parts |= numbered("dowel", lambda p: rod(2, 59.5, 66, p), at)
+    top = box(66, 56, 8, (0, 0, 62))
+    for place in at:
+        top = top - rod(2 + FIT, 60, 66.2, place)
+    parts["top"] = top
+    order = (("dowel*", "top"), ("drawer1", "knob1"), ("drawer2", "knob2"))
+    return Engineered(parts, frozenset({"body"}), order)
+
+
+def valve() -> Engineered:
+    """A seat, a ball and a stem with a bonnet, and a handle with its nut."""
+    body = box(40, 40, 40) - rod(12, 6, 50) - along_x(rod(6, -30, 30)).translate((0, 0, 16))
+    parts = {
+        "body": body,
+        "seat": tube(12 - FIT, 5, 6, 9),
+        "ball": Manifold.sphere(8, 48).translate((0, 0, 9 + 6.35)),
+        "bonnet": tube(17, 3 + FIT, 40, 46) + tube(12 - FIT, 3 + FIT, 30, 40),
+        "stem": rod(3, 24, 66) + rod(6, 24, 29.8),
+        "handle": box(60, 12, 5, (18, 0, 50)) - rod(3 + FIT, 40, 60),
+        "nut": nut((0, 0), 55, 3),
+    }
+    order = (("seat", "ball"), ("ball", "bonnet"), ("bonnet", "handle"), ("handle", "nut"))
+    return Engineered(parts, frozenset({"body"}), order)
+
+
+def clamp() -> Engineered:
+    """A strap over a pipe on a saddle, with two bolts, washers under their heads, and nuts."""
+    at = [(-24.0, 0.0), (24.0, 0.0)]
+    pipe = along_y(tube(14, 11, -40, 40)).translate((0, 0, 24))
+    room = along_y(rod(14 + FIT, -60, 60)).translate((0, 0, 24))
+    saddle = drilled(box(64, 30, 23, (0, 0, 0)), at, 2.1) - room
+    strap = drilled(box(64, 24, 16, (0, 0, 25)), at, 2.1) - room
+    parts = {"saddle": saddle, "pipe": pipe, "strap": strap}
+    parts |= numbered("washer", lambda p: tube(5, 2 + FIT, 41, 42, p), at)
+    parts |= numbered("bolt", lambda p: screw(p, 42, 48, 2), at)
+    parts |= numbered("nut", lambda p: nut(p, -3.2, 2), at)
+    order = (("pipe", "strap"), ("strap", "bolt*"), ("washer1", "bolt1"), ("washer2", "bolt2"))
+    return Engineered(parts, frozenset({"saddle"}), (*order, ("bolt1", "nut1"), ("bolt2", "nut2")))
+
+
+MADE = (instrument, flange, keyed_shaft, hinge, piston, cabinet, valve, clamp)
+
+
+def write_stl(parts: Parts, folder: Path) -> Path:
+    """The parts as STL files in millimetres, each where it is in the product."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for label, body in parts.items():
+        mesh = body.to_mesh()
+        points = np.asarray(mesh.vert_properties)[:, :3]
+        made = trimesh.Trimesh(points, np.asarray(mesh.tri_verts), process=False)
+        made.export(folder / f"{label}.stl")
+    return folder
+
 
 TEMPLATES = all_templates()
-
-QUICK = PlanOptions(lay_out=False)
-
-ENOUGH = 18
-"""Of twenty products so many are planned as an engineer would."""
 
 
 @pytest.fixture(autouse=True)
@@ -85,131 +305,14 @@ def plan_of(source: InPlace, options: PlanOptions) -> Planned:
 
 @pytest.mark.slow
 def test_orders_are_those_of_an_engineer_with_a_layout(tmp_path: Path) -> None:
-    assert len(MADE) == 20
+    """Of at least six of eight products."""
     wrong = {}
     for make in MADE:
         made = make()
         found = planned(made, tmp_path / make.__name__, PlanOptions())
         if bad := faults(made, found):
             wrong[make.__name__] = bad
-    assert len(MADE) - len(wrong) >= ENOUGH, wrong
-
-
-SEEN = ("upright_flange", "keyed_shaft", "clamp", "hinge", "toy_car", "battery_box")
-"""Products that are always planned."""
-
-
-@pytest.mark.parametrize(
-    "make",
-    [pytest.param(make, marks=() if make.__name__ in SEEN else pytest.mark.slow) for make in MADE],
-    ids=lambda make: make.__name__,
-)
-def test_the_order_is_that_of_an_engineer_and_nothing_is_cut_on_the_way(
-    make: Callable[[], Engineered], tmp_path: Path
-) -> None:
-    """The greatest volume that what comes has in common with what stands is that of when it is
-    there: none."""
-    engineered = make()
-    source = read_source(write_stl(engineered.parts, tmp_path), TEMPLATES, SourceOptions("mm"))
-    found = plan_of(source, QUICK)
-    assert faults(engineered, found) == []
-    made = planned_product(source, found.tree, found.orientation)
-    product = product_geometry(made.pag, made.files)
-    judged = matings(expand(made.pag, TEMPLATES), product)
-    assert len(judged.all) == len(source.parts) - 1 and not judged.of_kind("blocked")
-    bodies = {label: drawn(solid) for label, solid in product.solids.items()}
-    for mating in judged.all:
-        for way in ways(mating):
-            cut, finished = cuts(mating, made.pag, product, bodies, way)
-            assert cut <= finished + LEAST and finished <= LEAST, (mating.label, way)
-
-
-def test_what_falls_is_said_and_counted(tmp_path: Path) -> None:
-    """Pins through the holes of a plate fall until a foot is below them, which comes last if they
-    do not fit through it; in blind holes they stand."""
-    at = [(-20.0, 0.0), (20.0, 0.0)]
-    for low, falls in ((0, 1), (3, 0)):
-        pins = numbered("pin", lambda place, low=low: rod(3, low, 14, place), at)
-        plate = box(60, 40, 10) - rod(3, low, 20, at[0]) - rod(3, low, 20, at[1])
-        found = planned(
-            Engineered({"plate": plate, **pins}, frozenset(), ()), tmp_path / str(low), QUICK
-        )
-        assert leaves(found.tree)[0] == "plate"
-        assert "plate is the base, onto which all others come (--base)" in found.notes
-        assert found.figures.falls == falls
-        told = [note for note in found.notes if "hand or glue" in note]
-        assert told == ["the sub-assembly needs a hand or glue until more is there"] * falls
-
-
-def test_screws_come_from_above_if_the_product_can_stand_so(tmp_path: Path) -> None:
-    at = [(-20.0, -12.0), (20.0, 12.0)]
-    parts = {
-        "block": box(60, 40, 30) - rod(2, 10, 40, at[0]) - rod(2, 10, 40, at[1]),
-        "plate": box(60, 40, 5, (0, 0, 30)) - rod(2.2, 20, 50, at[0]) - rod(2.2, 20, 50, at[1]),
-        **numbered("screw", lambda place: screw(place, 35, 20, 2), at),
-    }
-    turned = {label: body.rotate((0, 90, 0)) for label, body in parts.items()}
-    found = planned(Engineered(turned, frozenset(), ()), tmp_path, QUICK)
-    assert "the product stands with +x of the file up" in found.notes[0]
-    assert all(join.lowered for join in found.operations)
-
-
-def test_a_product_is_not_put_onto_a_knob_for_its_screws(tmp_path: Path) -> None:
-    """They come from the side if what it would stand on then is small for its height."""
-    parts = {
-        "block": box(60, 60, 60) - along_x(rod(2, 10, 40)).translate((0, 0, 30)),
-        "plate": along_x(tube(25, 2.2, 30, 34)).translate((0, 0, 30)),
-        "screw": along_x(screw((0, 0), 34, 20, 2)).translate((0, 0, 30)),
-        "knob": along_x(rod(6, -40, -30)).translate((0, 0, 30)),
-    }
-    found = planned(Engineered(parts, frozenset(), ()), tmp_path, QUICK)
-    assert "the product stands as it was drawn, +z up" in found.notes[0]
-    assert screws_in(found.tree) == ("screw",)
-
-
-def test_the_base_is_below_what_is_as_heavy_and_touches_more(tmp_path: Path) -> None:
-    parts = {
-        "plate": box(120, 60, 20),
-        "block": drilled(box(80, 40, 40, (0, 0, 20)), [(-20, 0), (20, 0)], 3),
-        **numbered("peg", lambda place: rod(3, 20, 70, place), [(-20, 0), (20, 0)]),
-    }
-    found = planned(Engineered(parts, frozenset(), ()), tmp_path, QUICK)
-    assert leaves(found.tree)[0] == "plate"
-
-
-def test_what_is_in_a_hole_touches_it_whatever_its_play(tmp_path: Path) -> None:
-    """A lid as near to what is below it does not."""
-    parts = {
-        "tub": box(60, 40, 30) - box(56, 36, 40, (0, 0, 3)) + box(20, 20, 20, (0, 0, 3)),
-        "pin": rod(3, 10, 29.8),
-        "lid": box(60, 40, 3, (0, 0, 30)),
-    }
-    parts["tub"] = parts["tub"] - rod(3.2, 9.8, 40)
-    source = read_source(write_stl(parts, tmp_path), TEMPLATES, SourceOptions("mm"))
-    graphs = blocking(source)
-    pin, tub, lid = (graphs.labels.index(label) for label in ("pin", "tub", "lid"))
-    assert graphs.touch[pin, tub] and not graphs.touch[pin, lid]
-
-
-def test_a_screw_across_the_way_of_the_other_parts_is_driven_in(tmp_path: Path) -> None:
-    """Its pile is passed on to a robot on the other axis, and back."""
-    rail = box(100, 40, 10) + box(100, 20, 10, (0, 0, 10)) + box(100, 32, 8, (0, 0, 20))
-    slider = box(30, 60, 26, (0, 0, 11)) - box(40, 32.4, 8.4, (0, 0, 19.8))
-    slider = (
-        slider - box(40, 20.4, 20, (0, 0, 5)) - along_y(rod(1.5, -40, -16)).translate((0, 0, 24))
-    )
-    parts = {
-        "rail": rail,
-        "slider": slider,
-        "screw": along_y(rod(1.5, -30, -16.1) + rod(3, -34, -30)).translate((0, 0, 24)),
-    }
-    found = planned(Engineered(parts, frozenset(), ()), tmp_path, replace(QUICK, up=(2, +1)))
-    assert screws_in(found.tree) == ("screw",)
-    assert found.figures.relays == 2 and found.figures.blocked == 0
-    source = read_source(tmp_path, TEMPLATES, SourceOptions("mm"))
-    made = planned_product(source, found.tree, found.orientation)
-    judged = matings(expand(made.pag, TEMPLATES), product_geometry(made.pag, made.files))
-    assert len(judged.all) == 2 and not judged.of_kind("blocked")
+    assert len(MADE) == 8 and len(wrong) <= 2, wrong
 
 
 def test_names_say_what_is_in_and_what_on_another(tmp_path: Path) -> None:
@@ -226,24 +329,3 @@ def test_names_say_what_is_in_and_what_on_another(tmp_path: Path) -> None:
     assert titles.joined(("tub",), ("cell",)) == "cell_in_tub"
     assert titles.joined(("ring",), ("spool",)) == "ring_on_spool"
     assert titles.joined(("tub", "cell"), ("ring", "spool")) == "spool_on_tub"
-
-
-def test_a_driver_does_not_reach_a_screw_between_tall_walls(tmp_path: Path) -> None:
-    """It comes before them, although the walls leave room for its head; between low ones last."""
-    parts = {
-        "plate": box(80, 60, 12) - rod(2, 2, 20),
-        "tag": box(20, 20, 3, (0, 0, 12)) - rod(2.2, 0, 30),
-        "screw": screw((0, 0), 15, 12, 2),
-    }
-    for tall, before in ((30, False), (120, True)):
-        well = (
-            box(40, 40, tall, (0, 0, 15))
-            - box(9, 9, 2 * tall, (0, 0, 0))
-            - box(21, 21, 4, (0, 0, 12))
-        )
-        all_ = {**parts, "well": well + box(60, 50, 3, (0, 0, 12)) - box(22, 22, 10, (0, 0, 8))}
-        made = Engineered(
-            all_, frozenset({"plate"}), (("screw", "well"),) if before else (("well", "screw"),)
-        )
-        found = planned(made, tmp_path / str(tall), QUICK)
-        assert not faults(made, found), tall

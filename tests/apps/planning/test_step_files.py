@@ -1,5 +1,4 @@
-"""STEP files by three writers: OpenCASCADE 7.9 and SolveSpace 3.1 (`data/step`), and that of these
-tests. Colours by face, several solids a component, assemblies, inches: read as they were drawn."""
+"""STEP files by OpenCASCADE 7.9 (`data/step`) and by the writer of these tests: read as drawn."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from factory.apps.importing.scene_file import FINE, SHARE, read_step
 from factory.apps.planning.source import read_source
 from factory.floor.geometry.meshes import volume_of
 from factory.pipeline import all_templates
@@ -21,10 +19,8 @@ pytest.importorskip("cascadio")
 
 TEMPLATES = all_templates(())
 DATA = ROOT / "tests" / "data" / "step"
-CASES = ROOT.parent / "shared" / "cases"
 
 RED, BLUE, GREEN, GREY = (1.0, 0.0, 0.0), (0.2, 0.4, 0.8), (0.1, 0.7, 0.2), (0.5, 0.5, 0.5)
-PURE = (0.0, 1.0, 0.0)
 Part = tuple[tuple[float, ...], float | None, Vector | None]
 """A part as drawn: its box, low and high [mm], its volume [mm³], None where it is that of the box,
 and its colour, None for none."""
@@ -34,19 +30,10 @@ FILES: Mapping[str, Mapping[str, Part]] = {
         "lower": ((0, 0, 0, 40, 40, 20), None, BLUE),
         "upper": ((0, 0, 20, 40, 40, 30), None, GREY),
     },
-    "six_colours": {
-        "die": ((5, 5, 5, 25, 25, 25), None, (0.0, 1.0, 0.5)),
-        "tray": ((0, 0, 0, 30, 30, 5), None, None),
-    },
     "touching_solids": {
         "pair-1": ((0, 0, 0, 30, 30, 10), None, BLUE),
         "pair-2": ((30, 0, 0, 60, 30, 10), None, BLUE),
         "hollow": ((0, 0, 10, 30, 30, 40), 30**3 - 20**3, GREY),
-    },
-    "three_solids_one_part": {
-        "triple-1": ((0, 0, 0, 20, 20, 10), None, GREEN),
-        "triple-2": ((4, 4, 10, 16, 16, 25), np.pi * 36 * 15, GREEN),
-        "triple-3": ((0, 0, 25, 20, 20, 30), None, GREEN),
     },
     "nested_assembly": {
         "plate": ((-30, -20, 0, 30, 20, 10), 24000 - 2 * np.pi * 250, BLUE),
@@ -58,61 +45,12 @@ FILES: Mapping[str, Mapping[str, Part]] = {
         "base": ((0, 0, 0, 101.6, 50.8, 12.7), None, BLUE),
         "top": ((0, 0, 12.7, 101.6, 50.8, 38.1), None, GREY),
     },
-    "metres": {
-        "base": ((0, 0, 0, 300, 200, 50), None, None),
-        "top": ((90, 40, 50, 210, 160, 130), np.pi * 3600 * 80, None),
-    },
-    "turned_instances": {
-        "ell-1": ((0, 0, 0, 40, 30, 10), 6000, GREEN),
-        "ell-2": ((-30, 0, 10, 0, 40, 20), 6000, GREEN),
-        "ell-3": ((-40, -30, 20, 0, 0, 30), 6000, GREEN),
-    },
 }
 """What OpenCASCADE was told to write."""
 
-SOLVESPACE: Mapping[str, Mapping[str, Part]] = {
-    "solvespace_pin_in_plate": {
-        "Product-1": ((0, 0, 0, 40, 30, 10), 12000 - np.pi * 6.05**2 * 10, RED),
-        "Product-2": ((14, 9, 0, 26, 21, 25), np.pi * 36 * 25, PURE),
-    },
-    "solvespace_three_in_a_row": {
-        "Product-1": ((0, 0, 0, 20, 20, 10), None, (0.0, 0.0, 1.0)),
-        "Product-2": ((20.01, 0, 0, 40, 20, 20), None, PURE),
-        "Product-3": ((40.01, 0, 0, 60, 20, 30), None, RED),
-    },
-}
-"""What SolveSpace was told to write: one shell, in which each face has edges of its own."""
-
 LOWER, UPPER = ((0, 0, 0), (40, 40, 20)), ((0, 0, 20), (40, 40, 30))
 BESIDE: Box = ((40, 0, 0), (80, 40, 20))
-SIX = {n: (n / 6, 1 - n / 6, 0.5) for n in range(6)}
-FLAT = (0, 0, 0, 40, 40, 20), None, None
 OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
-    "faces": (
-        step_of(
-            {"lower": LOWER, "upper": UPPER},
-            colours={"lower": {-1: BLUE, 0: RED}, "upper": {2: RED}},
-        ),
-        {
-            "lower": ((0, 0, 0, 40, 40, 20), None, BLUE),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
-    "six": (
-        step_of({"lower": LOWER, "upper": UPPER}, colours={"lower": SIX}),
-        {
-            "lower": ((0, 0, 0, 40, 40, 20), None, SIX[4]),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
-    "solids": (
-        step_of({"pair": [LOWER, BESIDE], "upper": UPPER}),
-        {
-            "pair-1": FLAT,
-            "pair-2": ((40, 0, 0, 80, 40, 20), None, None),
-            "upper": ((0, 0, 20, 40, 40, 30), None, None),
-        },
-    ),
     "two colours": (
         step_of(
             {"pair": [LOWER, BESIDE], "upper": UPPER},
@@ -123,44 +61,7 @@ OWN: Mapping[str, tuple[str, Mapping[str, Part]]] = {
             "pair-2": ((40, 0, 0, 80, 40, 20), None, RED),
             "upper": ((0, 0, 20, 40, 40, 30), None, None),
         },
-    ),
-    "inches": (
-        step_of({"lower": ((0, 0, 0), (4, 4, 2)), "upper": ((0, 0, 2), (4, 4, 3))}, inches=True),
-        {
-            "lower": ((0, 0, 0, 101.6, 101.6, 50.8), None, None),
-            "upper": ((0, 0, 50.8, 101.6, 101.6, 76.2), None, None),
-        },
-    ),
-    "assembly": (
-        step_of(
-            {"base": ((0, 0, 0), (60, 20, 5)), "brick": ((0, 0, 0), (20, 20, 10))},
-            places={"base": [(0, 0, 0)], "brick": [(0, 0, 5), (20, 0, 5), (40, 0, 5)]},
-        ),
-        {
-            "base": ((0, 0, 0, 60, 20, 5), None, None),
-            "brick-1": ((0, 0, 5, 20, 20, 15), None, None),
-            "brick-2": ((20, 0, 5, 40, 20, 15), None, None),
-            "brick-3": ((40, 0, 5, 60, 20, 15), None, None),
-        },
-    ),
-    "assembly in inches": (
-        step_of(
-            {
-                "base": ((0, 0, 0), (6, 2, 1)),
-                "brick": [((0, 0, 0), (2, 2, 1)), ((0, 0, 1), (2, 2, 2))],
-            },
-            inches=True,
-            places={"base": [(0, 0, 0)], "brick": [(0, 0, 1), (4, 0, 1)]},
-            colours={"brick": {-1: RED}},
-        ),
-        {
-            "base": ((0, 0, 0, 152.4, 50.8, 25.4), None, None),
-            "brick-1-1": ((0, 0, 25.4, 50.8, 50.8, 50.8), None, RED),
-            "brick-2-1": ((0, 0, 50.8, 50.8, 50.8, 76.2), None, None),
-            "brick-1-2": ((101.6, 0, 25.4, 152.4, 50.8, 50.8), None, RED),
-            "brick-2-2": ((101.6, 0, 50.8, 152.4, 50.8, 76.2), None, None),
-        },
-    ),
+    )
 }
 """What our writer is told to write."""
 
@@ -192,47 +93,11 @@ def test_what_opencascade_wrote_is_read_as_it_was_drawn(name: str) -> None:
 
 
 @pytest.mark.usefixtures("steps")
-@pytest.mark.parametrize("name", SOLVESPACE)
-def test_what_solvespace_wrote_is_read_as_it_was_drawn(name: str) -> None:
-    assert_read(DATA / f"{name}.step", SOLVESPACE[name])
-
-
-@pytest.mark.usefixtures("steps")
 @pytest.mark.parametrize("name", OWN)
 def test_what_another_writer_wrote_is_read_as_it_was_drawn(tmp_path: Path, name: str) -> None:
     text, drawn = OWN[name]
     (tmp_path / "a.step").write_text(text)
     assert_read(tmp_path / "a.step", drawn)
-
-
-@pytest.mark.usefixtures("steps")
-@pytest.mark.parametrize(("prefix", "larger"), [(".CENTI.", 10), (".DECI.", 100)])
-def test_a_large_component_has_no_finer_facets_than_its_size_asks_for(
-    prefix: str, larger: int
-) -> None:
-    """The same assembly in larger units: as fine as before, it would have `larger` ** 0.5 times the
-    triangles."""
-    text = (DATA / "nested_assembly.step").read_text()
-    metres = text.replace("SI_UNIT(.MILLI.,.METRE.)", f"SI_UNIT({prefix},.METRE.)")
-    small, large = (read_step(content.encode()) for content in (text, metres))
-    for body, scaled in zip(small, large, strict=True):
-        (vertices, faces), (corners, triangles) = body.bodies[0], scaled.bodies[0]
-        assert np.ptp(corners, axis=0) == pytest.approx(larger * np.ptp(vertices, axis=0), rel=1e-2)
-        assert len(triangles) < 0.7 * larger**0.5 * len(faces) or len(faces) == 12
-        if "pin" in body.names[0]:
-            height = float(np.ptp(corners[:, 2]))
-            sides = len(np.unique(np.round(corners[:, :2], 6), axis=0))
-            sagitta = 4.9e-3 * larger * (1 - np.cos(np.pi / sides))
-            assert sagitta <= max(1e-3 * FINE, SHARE * height)
-
-
-@pytest.mark.usefixtures("steps")
-@pytest.mark.skipif(not CASES.exists(), reason="shared inputs are not here")
-@pytest.mark.parametrize(
-    ("name", "parts"), [("step_face_colour", 2), ("step_two_bodies_in_one_component", 3)]
-)
-def test_the_shared_files_are_read(name: str, parts: int) -> None:
-    assert len(read_source(CASES / f"{name}.step", TEMPLATES).parts) == parts
 
 
 @pytest.mark.parametrize(

@@ -11,25 +11,233 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.apps.deviations import Deviation, deviate
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.driven import DrivenSupervisor, drive
-from factory.apps.plc.signals import NOBODY, Commands, Sensed
+from factory.apps.plc.signals import NOBODY
 from factory.engine.simulation.compiled import compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from tests.apps.plc.test_plc import text
 from tests.examples import with_hands
-from tests.hostile_controllers import HostileController
 from tests.structured_text import Plc
 
 pytest.importorskip("asyncua", reason="the extra `opcua` is not installed")
 
+from dataclasses import replace
+from math import inf, nan
+from random import Random
+
 from asyncua import Client, ua
 
-from factory.apps.plc import opcua_server
 from factory.apps.plc.opcua import SPACE, OpcuaPlant
-from tests.hostile_clients import KIND, MISTYPED, Deaf, HostileClient, plain, unfit
+from factory.apps.plc.signals import Commands, Controller, Sensed
+from factory.floor.layout.layout import Layout
+
+SOON = 0.4
+"""Mean time between two changes of mind [s]."""
+
+
+class HostileController:
+    """Changes the commands of a controller by chance, drawn from a `seed`: targets anywhere on the
+    guidepaths and beyond, jobs and grips of any kind. Of a program, it changes a few robots at a
+    time."""
+
+    def __init__(self, layout: Layout, seed: int, program: Controller | None = None) -> None:
+        self._draw, self._program = Random(seed), program
+        strokes = [high for _, high in layout.spans[len(layout.guidepaths) :]]
+        self._ways = [*(path.length for path in layout.guidepaths), *strokes]
+        self._jobs = len(layout.factory.operations)
+        self._robots = len(layout.factory.robots)
+        self._next, self._last = 0.0, None if program else self._idle()
+        self._changes = dict[tuple[str, int], float]()
+
+    def _idle(self) -> Commands:
+        return Commands(np.zeros(len(self._ways)), (False,) * self._robots, (0,) * self._robots)
+
+    def scan(self, sensed: Sensed) -> Commands:
+        draw = self._draw
+        if self._program is not None:
+            self._last = self._program.scan(sensed)
+        elif not self._next:
+            self._last = replace(self._idle(), target=sensed.position.copy())
+        if sensed.time >= self._next:
+            self._next = sensed.time + draw.expovariate(1 / SOON)
+            self._changes = {} if self._program else self._changes
+            for _ in range(draw.randint(1, 3)):
+                self._change()
+        return self._changed()
+
+    def _change(self) -> None:
+        draw = self._draw
+        kind = draw.choice(["target", "target", "target", "job", "grip"])
+        if kind == "target":
+            axis = draw.randrange(len(self._ways))
+            at = draw.choice([0.0, 1.0, draw.random(), draw.random(), -1e308, 1e308, 3.0])
+            self._changes[kind, axis] = at * self._ways[axis] if abs(at) <= 3.0 else at
+        else:
+            most = self._jobs + 2 if kind == "job" else 2
+            self._changes[kind, draw.randrange(self._robots)] = draw.randrange(most)
+
+    def _changed(self) -> Commands:
+        assert self._last is not None
+        target, grip, job = self._last.target.copy(), [*self._last.grip], [*self._last.job]
+        for (kind, which), value in self._changes.items():
+            if kind == "target":
+                target[which] = value
+            elif kind == "job":
+                job[which] = int(value)
+            else:
+                grip[which] = bool(value)
+        return Commands(target, tuple(grip), tuple(job))
+
+
+KIND = ua.VariantType
+
+BAD = ua.StatusCode(ua.StatusCodes.BadSensorFailure)
+UNCERTAIN = ua.StatusCode(ua.StatusCodes.UncertainLastUsableValue)
+
+
+def plain(value: Any, kind: Any, status: Any = None, **how: Any) -> Any:
+    """A value as it is written."""
+    return ua.DataValue(ua.Variant(value, kind, **how), status)
+
+
+Written = tuple[str, Any, str]
+"""A variable of the outputs, what is written into it, and what is told of it then."""
+
+
+def unfit(axes: int, robots: int) -> dict[str, Written]:
+    """What fits no command, by its kind."""
+    doubles, matrix = [0.1] * axes, [[0.1] * 6] * 6
+    return {
+        "a heartbeat with a bad status": (
+            "Heartbeat",
+            plain(7, KIND.UInt32, BAD),
+            "Heartbeat was written with the status BadSensorFailure: not a number of type UInt32",
+        ),
+        "an uncertain heartbeat": (
+            "Heartbeat",
+            plain(7, KIND.UInt32, UNCERTAIN),
+            "status UncertainLastUsableValue",
+        ),
+        "a list of heartbeats": ("Heartbeat", plain([1, 2], KIND.UInt32), "Heartbeat is [1, 2]"),
+        "a target with a bad status": (
+            "Target",
+            plain(doubles, KIND.Double, BAD),
+            "Target was written with the status BadSensorFailure",
+        ),
+        "a matrix": ("Target", plain(matrix, KIND.Double), "Target is [["),
+        "no array": ("Target", plain(0.1, KIND.Double), "Target is 0.1"),
+        "too short": ("Target", plain([0.1], KIND.Double), "Target is [0.1]"),
+        "too long": ("Target", plain([0.1] * (axes + 1), KIND.Double), "Target is [0.1, "),
+        "empty": ("Target", plain([], KIND.Double), "Target is "),
+        "nan": ("Target", plain([nan] * axes, KIND.Double), "Target is [nan"),
+        "inf": ("Target", plain([inf] * axes, KIND.Double), "Target is [inf"),
+        "grips with a bad status": (
+            "Grip",
+            plain([True] * robots, KIND.Boolean, BAD),
+            "Grip was written with the status",
+        ),
+        "one grip": ("Grip", plain(True, KIND.Boolean), "Grip is True"),
+        "a matrix of grips": (
+            "Grip",
+            plain([[True] * robots] * robots, KIND.Boolean),
+            "Grip is [[",
+        ),
+        "a job": ("Job", plain(3, KIND.UInt16), "Job is 3"),
+    }
+
+
+MISTYPED: dict[str, tuple[str, Any]] = {
+    "text": ("Target", plain("home", KIND.String)),
+    "texts": ("Target", plain(["home"] * 6, KIND.String)),
+    "whole numbers": ("Target", plain([1] * 6, KIND.Int64)),
+    "single precision": ("Target", plain([0.1] * 6, KIND.Float)),
+    "bytes": ("Grip", plain(b"\x00" * 6, KIND.ByteString)),
+    "numbers for grips": ("Grip", plain([1] * 6, KIND.Byte)),
+    "signed jobs": ("Job", plain([-1] * 6, KIND.Int16)),
+    "a null": ("Heartbeat", plain(None, KIND.Null)),
+    "no value": ("Target", ua.DataValue()),
+    "a negative heartbeat": ("Heartbeat", plain(-1, KIND.Int32)),
+}
+"""What the protocol itself refuses: values of another type."""
+
+
+class HostileClient:
+    """Writes and subscribes by chance, drawn from a `seed`, at an `address`, until told to
+    `stop`."""
+
+    def __init__(self, address: str, seed: int, axes: int, robots: int, length: float) -> None:
+        self._address, self._draw = address, Random(seed)
+        self._axes, self._robots, self._length = axes, robots, length
+        self._beat, self.writes = 0, 0
+
+    async def run(self, stop: Callable[[], bool]) -> None:
+        """Connect, do harm, leave without a word, and come back."""
+        while not stop():
+            client = Client(self._address, timeout=2)
+            try:
+                await client.connect()
+                await self._harm(client, stop)
+                if self._draw.random() < 0.5:
+                    client.uaclient.protocol.transport.abort()
+                else:
+                    await client.disconnect()
+            except (TimeoutError, OSError, ua.UaError, RuntimeError):
+                await asyncio.sleep(0.01)
+
+    async def _harm(self, client: Client, stop: Callable[[], bool]) -> None:
+        space = await client.get_namespace_index(SPACE)
+        for _ in range(self._draw.randint(5, 60)):
+            if stop():
+                return
+            name, value = self._value()
+            self._beat += 1
+            beat = client.get_node(f"ns={space};s=Outputs.Heartbeat")
+            try:
+                await client.get_node(f"ns={space};s={name}").write_value(value)
+                self.writes += 1
+                await beat.write_value(self._beat, KIND.UInt32)
+                if self._draw.random() < 0.1:
+                    period = self._draw.choice([0, 1e-6, 10, 1e9, nan])
+                    made = await client.create_subscription(period, Deaf())
+                    await made.subscribe_data_change(client.get_node(f"ns={space};s=Plant.Time"))
+                    await made.subscribe_events()
+            except ua.UaStatusCodeError:
+                pass
+
+    def _value(self) -> tuple[str, Any]:
+        draw = self._draw
+        kind = draw.random()
+        if kind < 0.15:
+            name, value, _ = draw.choice([*unfit(self._axes, self._robots).values()])
+            return f"Outputs.{name}", value
+        if kind < 0.25:
+            name, value = draw.choice([*MISTYPED.values()])
+            return f"Outputs.{name}", value
+        if kind < 0.3:
+            names = ["Inputs.Position", "Plant.Time", "Plant.ProtectiveStop", "Inputs.Held"]
+            return draw.choice(names), plain([0.0] * self._axes, KIND.Double)
+        if kind < 0.6:
+            far = draw.choice([self._length, self._length, 1e308, -1e308])
+            targets = [draw.random() * far for _ in range(self._axes)]
+            return "Outputs.Target", plain(targets, KIND.Double)
+        if kind < 0.8:
+            jobs = [draw.choice([0, 0, 1, 2, 3, 4, 5, 65535]) for _ in range(self._robots)]
+            return "Outputs.Job", plain(jobs, KIND.UInt16)
+        grips = [draw.random() < 0.5 for _ in range(self._robots)]
+        return "Outputs.Grip", plain(grips, KIND.Boolean)
+
+
+class Deaf:
+    """Takes what a subscription sends."""
+
+    def datachange_notification(self, *_: Any) -> None:
+        pass
+
+    def event_notification(self, *_: Any) -> None:
+        pass
+
 
 TRIES = 300
 """So often, every 20 ms, what has to come about is looked for."""
@@ -69,109 +277,6 @@ async def until(read: Callable[[], Awaitable[Any]], wanted: Callable[[Any], bool
     return value
 
 
-def test_what_fits_no_command_is_refused_by_name_and_the_plant_stands() -> None:
-    seen = dict[str, tuple[str, bool, bool]]()
-
-    async def talk(plant: OpcuaPlant) -> None:
-        async with Client(plant.address) as client:
-            space = await client.get_namespace_index(SPACE)
-            nodes = {
-                name: client.get_node(f"ns={space};s={folder}.{name}")
-                for folder, names in (
-                    ("Outputs", ("Target", "Grip", "Job", "Heartbeat")),
-                    ("Plant", ("LastRefusal", "ProtectiveStop")),
-                    ("Inputs", ("Position",)),
-                )
-                for name in names
-            }
-            last, stands = nodes["LastRefusal"].read_value, nodes["ProtectiveStop"].read_value
-            home = await nodes["Position"].read_value()
-            good = {
-                "Target": plain(home, KIND.Double),
-                "Grip": plain([False] * 6, KIND.Boolean),
-                "Job": plain([0] * 6, KIND.UInt16),
-            }
-            for beat, (kind, (name, value, told)) in enumerate(unfit(6, 6).items(), start=1):
-                await nodes[name].write_value(value)
-                message = await until(last, lambda text, told=told: told in text)
-                stood = await until(stands, lambda stop: stop)
-                if name in good:
-                    await nodes[name].write_value(good[name])
-                await nodes["Heartbeat"].write_value(beat, KIND.UInt32)
-                seen[kind] = message, stood, not await until(stands, lambda stop: not stop)
-            for name, value in MISTYPED.values():
-                with pytest.raises(ua.uaerrors.BadTypeMismatch):
-                    await nodes[name].write_value(value)
-            for name in ("Position", "LastRefusal", "ProtectiveStop"):
-                with pytest.raises(ua.uaerrors.BadUserAccessDenied):
-                    await nodes[name].write_value(await nodes[name].read_data_value())
-
-    plant = served(talk)
-    for kind, (_, _, told) in unfit(6, 6).items():
-        message, stood, went_on = seen[kind]
-        assert told in message, kind
-        assert stood and went_on, kind
-    assert len(plant.refusals) == len(seen)
-
-
-def test_there_are_no_accounts() -> None:
-    async def talk(plant: OpcuaPlant) -> None:
-        for user, password in (("admin", None), ("Admin", ""), ("root", "root")):
-            client = Client(plant.address)
-            client.set_user(user)
-            if password is not None:
-                client.set_password(password)
-            with pytest.raises((ua.UaError, OSError)):
-                await client.connect()
-        async with Client(plant.address) as client:
-            with pytest.raises(ua.UaError):
-                await client.nodes.objects.add_object(2, "mine")
-            with pytest.raises(ua.UaError):
-                await client.delete_nodes([client.nodes.objects])
-
-    served(talk)
-
-
-def test_who_is_gone_has_no_subscriptions_and_nobody_has_many(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(opcua_server, "MOST_ITEMS", 20)
-
-    async def talk(plant: OpcuaPlant) -> None:
-        taken = plant._server.server.iserver.subscription_service.subscriptions
-
-        async def count() -> int:
-            return len(taken)
-
-        gone = [Client(plant.address) for _ in range(3)]
-        for client in gone:
-            await client.connect()
-            for _ in range(4):
-                made = await client.create_subscription(1e-6, Deaf())
-                await made.subscribe_events()
-        periods = {one.data.RevisedPublishingInterval for one in taken.values()}
-        assert periods == {opcua_server.SHORTEST}
-        assert len(taken) == 12
-        for client in gone:
-            client.uaclient.protocol.transport.abort()
-        assert await until(count, lambda left: not left) == 0
-        async with Client(plant.address) as client:
-            space = await client.get_namespace_index(SPACE)
-            time = client.get_node(f"ns={space};s=Plant.Time")
-            kept = await client.create_subscription(100, Deaf())
-            await kept.subscribe_data_change([time] * 10)
-            greedy = await client.create_subscription(100, Deaf())
-            await greedy.subscribe_data_change([time] * 11)
-            assert await until(count, lambda left: left == 1) == 1
-            assert kept.subscription_id in taken
-            for _ in range(opcua_server.MOST_SUBSCRIPTIONS - 1):
-                await client.create_subscription(1000, Deaf())
-            with pytest.raises(ua.uaerrors.BadTooManySubscriptions):
-                await client.create_subscription(1000, Deaf())
-
-    served(talk)
-
-
 def test_a_subscription_whose_filter_fails_is_dropped() -> None:
     """It selects what an event does not have in a way that the server cannot read."""
 
@@ -195,9 +300,6 @@ def test_a_subscription_whose_filter_fails_is_dropped() -> None:
     served(talk)
 
 
-# what is driven
-
-
 def driven(
     controller: Any, name: str = "paper", busy: float = float("inf"), most: float = 6.0
 ) -> tuple[Simulation, DrivenSupervisor]:
@@ -206,31 +308,6 @@ def driven(
     simulation.world.hooks.busy = busy
     simulation.run(max_time=most)
     return simulation, supervisor
-
-
-class Sending:
-    """A controller that sends axes to targets [m], and does nothing else."""
-
-    def __init__(self, **targets: float) -> None:
-        self._targets = {int(axis[1:]): at for axis, at in targets.items()}
-
-    def scan(self, sensed: Sensed) -> Commands:
-        target, robots = sensed.position.copy(), len(sensed.held)
-        for axis, at in self._targets.items():
-            target[axis] = at
-        return Commands(target, (False,) * robots, (0,) * robots)
-
-
-@pytest.mark.parametrize("far", [-1e308, -1.0, 1e308])
-def test_targets_end_where_the_corridor_does(far: float) -> None:
-    layout = with_hands("paper")
-    simulation, supervisor = driven(Sending(x2=far), most=2.0)
-    at, length = float(simulation.world.sense()[0][2]), layout.guidepaths[2].length
-    assert -1e-3 <= at <= length + 1e-3
-    (refusal,) = supervisor.refusals
-    assert refusal.robot == 2
-    assert refusal.message.startswith(f"r3 is sent to {far:.6g} m: it may go between ")
-    assert simulation.world.collision == ""
 
 
 def test_machines_that_touch_stop_for_good(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -247,20 +324,6 @@ def test_machines_that_touch_stop_for_good(monkeypatch: pytest.MonkeyPatch) -> N
     assert "touch: all axes stand until the plant is started anew" in stop.message
     assert supervisor.tripped
     assert np.abs(simulation.world.sense()[1]).max() < 1e-3
-
-
-def test_a_plant_in_which_a_part_is_dropped_says_that_it_stopped() -> None:
-    simulation = deviate(
-        Simulation(with_hands("lamp"), RunRequest(units=2)), Deviation("mass", factor=2.0)
-    )
-    plc = Plc(text("lamp"))
-    supervisor = drive(simulation, plc, plc.interval)
-    simulation.run(max_time=10.0)
-    assert simulation.world.dropped is not None
-    assert supervisor.tripped
-    stop = supervisor.refusals[-1]
-    assert stop.robot == NOBODY and stop.message.startswith("r3 drops 'shade'")
-    assert "all axes stand until the plant is started anew" in stop.message
 
 
 def test_a_carrier_stays_for_what_can_no_longer_stop_before_it() -> None:
@@ -296,24 +359,6 @@ def test_a_carrier_stays_for_what_can_no_longer_stop_before_it() -> None:
                 assert let_in == (leaving == 0.0)
                 tried += 1
     assert tried >= 12
-
-
-def test_parts_change_hands_at_rest_only() -> None:
-    """A program that gives a job up on its way past the goal is refused."""
-    program = text("paper")
-    moving = program.replace(".Speed) < 0.0099", ".Speed) < 9.9")
-    assert moving != program
-    simulation = Simulation(with_hands("paper"), RunRequest(units=2))
-    plc = Plc(moving.replace("< 0.0002", "< 0.0009"))
-    supervisor = drive(simulation, plc, plc.interval)
-    simulation.run(max_time=10.0)
-    messages = [refusal.message for refusal in supervisor.refusals]
-    assert any("still moves at " in message for message in messages), messages
-    assert simulation.world.collision == ""
-
-
-def test_hostile_controllers_do_no_harm() -> None:
-    assert harmed_by("paper", range(1, 4), 6.0) == {}
 
 
 @pytest.mark.slow

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from factory.apps.foreign_nets.behaviour import play
 from factory.apps.recovery.undo import marking_after, tokens_after, undo
-from factory.theory.nets.history import firings
-from factory.theory.nets.marked import MarkedNet, marked, token_free
-from factory.theory.nets.petri import Marking
-from factory.theory.nets.undone import Joins, Undone
+from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.replay import ReplayVerdict, replay
+from factory.theory.nets.undone import Entry, Joins, Undone, lasting
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import NOPART
-from tests.fold_values import inserted, plain, random_fold, three_robots
+from tests.fold_values import random_fold, three_robots
 from tests.net_values import fair_run, random_marked_net
 from tests.pag_values import factory_of, paper
-from tests.token_game import enabled, follower
 
 Counts = tuple[int, ...]
 randoms = st.randoms(use_true_random=False)
@@ -38,9 +35,6 @@ def some_asked(fired: Counts, rng: random.Random) -> tuple[int, ...]:
     have = [event for event, count in enumerate(fired) if count]
     chosen = rng.sample(have, min(len(have), rng.randint(1, 3)))
     return tuple(e for e in chosen for _ in range(rng.randint(1, min(2, fired[e]))))
-
-
-# --- the greatest, by brute force ----------------------------------------------------------------
 
 
 def brute(net: MarkedNet, fired: Counts, asked: tuple[int, ...], made: Joins) -> Counts:
@@ -100,20 +94,6 @@ def test_what_cannot_be_undone() -> None:
         undo(factory.net, nothing, (), factory.joins)
 
 
-# --- Theorem 5, at every marking -----------------------------------------------------------------
-
-
-def reachable(factory: Factory) -> set[Marking]:
-    """Every marking, by the token game."""
-    net, start = factory.net.threaded.net, factory.net.initial_marking
-    seen, todo = {start}, [start]
-    for marking in todo:
-        there = {follower(net, marking, (event,)) for event in enabled(net, marking)}
-        todo += there - seen
-        seen |= there
-    return seen
-
-
 def failures(factory: Factory, fired: Sequence[int]) -> Iterator[tuple[int, ...]]:
     """All that can be asked: to redo what is under way, and what to do about a lost pile."""
     for o in factory.operations:
@@ -124,85 +104,114 @@ def failures(factory: Factory, fired: Sequence[int]) -> Iterator[tuple[int, ...]
             yield (o.end,)
 
 
-def held(factory: Factory, marking: Marking) -> dict[int, str]:
-    """What each robot has, by the place that it is at."""
-    found = {}
-    for number, gear in enumerate(factory.net.gears):
-        step = next(i for i, place in enumerate(gear.places) if place in marking)
-        operation = factory.operations[factory.robots[number].operations[step // 2]]
-        found[number] = operation.before[operation.robots.index(number)]
-    return found
+seeds = st.integers(0, 10**6)
 
 
-def wanting(factory: Factory, fired: Counts, after: Counts, asked: Iterable[int] = ()) -> list[str]:
-    """What robots would have to hold after an undo that they did not hold before it, or have lost:
-    that of which the end is asked to be undone."""
-    lost = {factory.operations[event // 2].label for event in asked if event % 2}
-    had, has = (held(factory, marking_after(factory.net, n)) for n in (fired, after))
-    pairs = has.items()
-    return [x for robot, x in pairs if x != NOPART and (x != had[robot] or x in lost)]
+@dataclass
+class Story:
+    """A run that is written as it goes: firings at random, and failures."""
+
+    factory: Factory
+    rng: random.Random
+    fired: list[int] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.fired = [0] * len(self.factory.net.threaded.transitions)
+
+    def run(self, steps: int) -> None:
+        net = self.factory.net.threaded
+        for _ in range(steps):
+            here = tokens_after(self.factory.net, self.fired)
+            needs = net.net.preset
+            ready = [e for e in range(len(needs)) if all(here[p] for p in needs[e])]
+            event = self.rng.choice(ready)
+            self.fired[event] += 1
+            self.entries.append(net.transitions[event].name)
+
+    def fail(self) -> bool:
+        """Whether there was something to fail."""
+        every = [*failures(self.factory, self.fired)]
+        if every:
+            asked = self.rng.choice(every)
+            after = undo(self.factory.net, self.fired, asked, self.factory.joins)
+            what = 0.0, "x", "lost"
+            self.entries.append(Undone.between(self.factory.net, what, asked, self.fired, after))
+            self.fired = [*after]
+        return bool(every)
 
 
-PAPER: list[tuple[Callable[[], Factory], int, int]] = [
-    (three_robots, 26, 49),
-    (lambda: plain(inserted(paper())), 78, 199),
-    (lambda: factory_of(paper()), 342, 1_377),
-]
+def judged(story: Story, first: Factory) -> ReplayVerdict:
+    return replay(first.net, story.entries, None, first.joins)
 
 
-@pytest.mark.parametrize(("made", "markings", "undos"), PAPER)
-def test_every_failure_at_every_marking(
-    made: Callable[[], Factory], markings: int, undos: int
-) -> None:
-    """None leaves the reachable set, or asks a robot to hold what it had not."""
-    factory = made()
-    net, seen, count, bad = marked(factory.net), reachable(factory), 0, 0
-    for marking in seen:
-        least = firings(factory.net, marking)
-        fired = tuple(least[event] + 3 for event in range(len(least)))
-        for asked in failures(factory, fired):
-            after = undo(net, fired, asked, factory.joins)
-            assert marking_after(net, after) in seen
-            assert wanting(factory, fired, after, asked) == []
-            bad += bool(wanting(factory, fired, undo(net, fired, asked, {})))
-            count += 1
-    assert (len(seen), count) == (markings, undos)
-    assert bad > 0, "without the material rule no robot would be asked for what it had not"
+def story_of(factory: Factory, rng: random.Random) -> Story:
+    """A run with up to three failures."""
+    story = Story(factory, rng)
+    for _ in range(3):
+        story.run(rng.randint(0, 3 * len(factory.operations)))
+        story.fail()
+    story.run(5)
+    return story
 
 
-@given(st.integers(0, 10**6), randoms)
-def test_undos_of_folds(seed: int, rng: random.Random) -> None:
-    """The marking is reached by firing so often, nothing is stuck there, and no robot is asked to
-    hold what it had not; so again for a second failure."""
-    factory = random_fold(seed, 16)
-    net, made = marked(factory.net), factory.joins
-    fired = fired_by(factory, rng.randint(1, 8 * len(factory.operations)), rng)
-    for _ in range(2):
-        every = [*failures(factory, fired)]
-        if not every:
-            return
-        asked = rng.choice(every)
-        after = undo(net, fired, asked, made)
-        assert all(after[event] < fired[event] for event in asked)
-        assert wanting(factory, fired, after, asked) == []
-        check_reached(net, after)
-        fired = after
+@given(seeds, randoms)
+def test_a_run_with_failures_replays(seed: int, rng: random.Random) -> None:
+    """To the marking of its counts; so does what is left of it without what was undone."""
+    factory = random_fold(seed, 12)
+    story = story_of(factory, rng)
+    found = judged(story, factory)
+    assert (found.refines, found.reason) == (True, "")
+    assert found.events == len(story.entries)
+    assert found.marking == marking_after(factory.net, story.fired)
+    left = replay(factory.net, [story.entries[at] for at in lasting(story.entries)])
+    assert (left.refines, left.marking) == (True, found.marking)
 
 
-def check_reached(net: MarkedNet, fired: Counts) -> None:
-    """That the counts can be fired from m_0, and that no circuit is then free of tokens."""
-    tokens = tokens_after(net, fired)
-    played = [*play(net, dict(enumerate(fired)))]
-    assert tuple(played.count(event) for event in range(len(fired))) == fired
-    assert token_free(MarkedNet(net.net, tokens)).stuck == ()
-
-
-def test_how_often_each() -> None:
-    """A pile is lost with all that made it; what was made for the next unit is not."""
-    factory = factory_of(paper())
+@given(seeds, randoms, st.integers(0, 4))
+def test_any_other_undo_is_refused(seed: int, rng: random.Random, how: int) -> None:
+    """A transition less, one more, one in place of another, nothing, something else asked for."""
+    factory = random_fold(seed, 10)
+    story = story_of(factory, rng)
+    undone = [(at, entry) for at, entry in enumerate(story.entries) if isinstance(entry, Undone)]
+    assume(undone)
+    at, entry = rng.choice(undone)
     names = [t.name for t in factory.net.threaded.transitions]
-    twice, once = {"part1_s", "part1_e"}, {"part2_s", "part2_e", "sub1_s", "sub1_e"}
-    fired = tuple(2 * (name in twice) + (name in once) for name in names)
-    after = undo(factory.net, fired, (factory.by_label["sub1"].end,), factory.joins)
-    undone = Undone.between(factory.net, (1.0, "sub1", "lost"), (), fired, after)
-    assert sorted(undone.transitions) == sorted(twice | once)
+    other = rng.choice(names)
+    gone = rng.randrange(len(entry.transitions))
+    kept = entry.transitions[:gone] + entry.transitions[gone + 1 :]
+    assume(how != 2 or other != entry.transitions[gone])
+    bad = (
+        replace(entry, transitions=kept),
+        replace(entry, transitions=(*entry.transitions, other)),
+        replace(entry, transitions=(*kept, other)),
+        replace(entry, transitions=()),
+        replace(entry, asked=()),
+    )[how]
+    story.entries[at] = bad
+    found = judged(story, factory)
+    assert not found.refines
+    assert found.index == at
+    assert "the undo of x" in found.reason
+
+
+def test_the_reasons() -> None:
+    factory = three_robots()
+    made = factory.joins
+    undone = Undone(0.0, "part1", "lost", ("part1_s",), ("part1_s",))
+
+    def reason(entry: Undone, material: Joins | None = made) -> str:
+        found = replay(factory.net, [entry], None, material)
+        assert not found.refines and found.marking == factory.net.initial_marking
+        return found.reason
+
+    assert reason(undone) == "part1_s is to be undone, and has not fired so often"
+    assert "no material is known" in reason(undone, None)
+    assert "no transition 'y_s'" in reason(replace(undone, asked=("y_s",)))
+    assert "asks for nothing" in reason(replace(undone, asked=()))
+
+
+def test_the_latest_firings_are_undone() -> None:
+    undone = Undone(0.0, "x", "", ("a",), ("a",))
+    assert lasting(["a", "b", "a", undone, "b"]) == [0, 1, 4]
+    assert lasting(["a", undone, undone, "a", "b"]) == [3, 4]

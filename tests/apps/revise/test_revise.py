@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import random
 from dataclasses import replace
 from pathlib import Path
@@ -11,20 +10,18 @@ import pytest
 
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.revise.family import family
-from factory.apps.revise.matching import below, label_digests, matching, shifted
+from factory.apps.revise.matching import label_digests, matching, shifted
 from factory.apps.revise.revision import Revision, revised
 from factory.floor.layout.certificate import Fault
-from factory.floor.layout.clearance import certify
 from factory.pipeline import Project, all_templates
-from factory.support.errors import Diagnostic, InputError, RunError
+from factory.support.errors import InputError
 from factory.theory.lang import read_pag, write_pag
 from factory.theory.lang.pag_reader import load_pag
-from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Mix, Parameter
 from factory.theory.problem.plan import Plan
 from tests.command_line import spawn
 from tests.paths import EXAMPLES
-from tests.revisions import KINDS, edited, kept_share, refuted, shuffled
+from tests.revisions import edited, kept_share, refuted, shuffled
 
 
 def example(name: str) -> PAG:
@@ -64,33 +61,6 @@ def test_what_becomes_of_the_labels_of_the_truck() -> None:
     }
 
 
-@pytest.mark.parametrize("name", ["truck", "chair", "gearbox", "paper"])
-def test_all_labels_renamed_change_nothing(name: str) -> None:
-    pag = example(name)
-    share = kept_share(pag, shuffled(pag, random.Random(1)))
-    assert len({*share.values()}) == 1
-
-
-@pytest.mark.parametrize("name", ["truck", "chair", "gearbox"])
-def test_mappings_are_one_to_one_and_keep_ancestors(name: str) -> None:
-    pag = example(name)
-    for seed in range(30):
-        new = shuffled(edited(pag, rng := random.Random(seed), 1 + seed % 10), rng)
-        labels = matching(pag, new).labels
-        assert len({*labels.values()}) == len(labels)
-        for label, other in labels.items():
-            inputs, there = ({*below(tree, x)} for tree, x in ((pag, label), (new, other)))
-            assert {labels[x] for x in inputs if x in labels} <= there
-
-
-def test_few_edits_keep_most_robots() -> None:
-    pag, total = example("truck"), []
-    for seed in range(20):
-        share = kept_share(pag, edited(pag, random.Random(seed * 31 + 1), 1))
-        total.append(share["paired"] / share["old"])
-    assert sum(total) / len(total) > 0.96
-
-
 def test_a_product_that_lies_elsewhere_is_the_same() -> None:
     pag = example("truck")
     moved = shifted(pag, (0.1, -0.02, 0.005))
@@ -98,22 +68,6 @@ def test_a_product_that_lies_elsewhere_is_the_same() -> None:
     assert found.shift == (0.1, -0.02, 0.005)
     assert all(map(found.is_equal, pag.by_label))
     assert label_digests(pag)["log1"] != label_digests(moved)["log1"]
-
-
-def test_a_digest_is_of_the_content_of_meshes() -> None:
-    pag = example("gearbox")
-    lid = pag["lid"].parameter("mesh")
-    other = tuple(
-        replace(
-            n,
-            parameters=tuple(
-                replace(p, value="gearbox/foot.obj") if p.value == lid else p for p in n.parameters
-            ),
-        )
-        for n in pag.nodes
-    )
-    found = matching(pag, replace(pag, nodes=other))
-    assert found.changed == {"lid": "lid"}
 
 
 def test_a_step_put_in_is_stepped_over() -> None:
@@ -137,17 +91,6 @@ def truck_to_van() -> Revision:
     return revised(project(example("truck")), project(van()))
 
 
-def test_robots_of_the_truck_stay_for_the_van(truck_to_van: Revision) -> None:
-    found = truck_to_van
-    assert sum(kept.whole for kept in found.kept) == 19
-    assert (found.gone, found.added) == (["r3", "r4"], [])
-    factory = found.new.layout.factory
-    names = [robot.name for robot in factory.robots]
-    assert names == ["r1", "r2", *(f"r{n}" for n in range(5, 24))]
-    assert verify(factory.net).live
-    assert certify(found.new.layout).holds
-
-
 def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van: Revision) -> None:
     found, mine = truck_to_van, truck_to_van.inheritance
     old, new = found.old.layout, found.new.layout
@@ -169,79 +112,16 @@ def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van:
     assert "does not hold" in next(refuted(mine, faulty, new, found.pairing))
 
 
-def test_the_same_product_keeps_everything() -> None:
-    pag = example("chair")
-    found = revised(project(pag), project(shifted(shuffled(pag, random.Random(4)), (0.1, 0, 0))))
-    assert all(kept.whole for kept in found.kept) and len(found.kept) == 19
-    assert found.inheritance.inherited == found.inheritance.pairs
-    assert found.pairing.matching.shift == (0.1, 0.0, 0.0)
-
-
-def test_single_edits_of_the_chair_leave_most_robots_in_place() -> None:
-    pag, old, shares = example("chair"), project(example("chair")), list[float]()
-    for seed in (1, 2, 3, 5):
-        new = edited(pag, random.Random(seed), 1, ("change", "drop", "swap", "tool", "rename"))
-        found = revised(old, project(new))
-        shares.append(sum(kept.place for kept in found.kept) / len(found.kept))
-    assert min(shares) > 0.8
-    assert sum(shares) / len(shares) > 0.95
-
-
-@pytest.mark.parametrize(
-    ("name", "joined", "place", "module"),
-    [("truck", "body", 17, 22), ("gearbox", "gearbox", 17, 17)],
-)
-def test_an_added_part_moves_few(name: str, joined: str, place: int, module: int) -> None:
+def test_an_added_part_moves_few() -> None:
     """The other robots of a floor, or the new one's own branch; hands stay to the micrometre."""
-    old, seed = project(example(name)), {"body": 700, "gearbox": 705}[joined]
+    old = project(example("gearbox"))
     height = round(float(old.product.high[2] - old.product.low[2]), 3)
-    kinds = KINDS if name == "truck" else ("add",)
-    new = edited(old.pag, random.Random(seed), 1, kinds, height)
-    assert new[joined].inputs[-1] == "added1"
+    new = edited(old.pag, random.Random(705), 1, ("add",), height)
+    assert new["gearbox"].inputs[-1] == "added1"
     found = revised(old, project(new))
-    assert sum(kept.place for kept in found.kept) >= place
-    assert sum(kept.module for kept in found.kept) >= module
+    assert sum(kept.place for kept in found.kept) >= 17
+    assert sum(kept.module for kept in found.kept) >= 17
     assert [*refuted(found.inheritance, found.old.layout, found.new.layout, found.pairing)] == []
-
-
-def test_command_writes_a_plan_that_keeps_the_names(tmp_path: Path) -> None:
-    for name, pag in (("truck", example("truck")), ("van", van())):
-        (tmp_path / f"{name}.pag").write_text(write_pag(pag))
-    files, out = [str(tmp_path / f"{n}.pag") for n in ("truck", "van")], tmp_path / "out"
-    picture = tmp_path / "kept.svg"
-    done = spawn("revise", *files, "-o", str(out), "--picture", str(picture), "--json")
-    document = done.json
-    assert done.status == 0, done.err
-    assert document["robots"] == {"old": 23, "new": 21} and document["gone"] == ["r3", "r4"]
-    assert document["pairs_inherited"] + document["pairs_computed"] == document["pairs"]
-    drawn = picture.read_text()
-    for style, count in (("dot stays", 17), ("dot changed", 1), ("post", 11), ("gone-name", 2)):
-        assert drawn.count(f'class="{style}"') >= count, style
-    assert 'class="way"' not in drawn and ">r3<" in drawn
-    plan = json.loads((out / "plan.json").read_text())
-    assert plan["plan"]["names"][:3] == ["r1", "r2", "r5"]
-    checked = spawn("check", str(out / "plan.json"), "--json")
-    assert [gear["robot"] for gear in checked.json["gears"]][2] == "r5"
-    kept = spawn("revise", str(out / "plan.json"), files[1], "--json").json["kept"]
-    assert all(robot["place"] and robot["module"] for robot in kept) and len(kept) == 21
-
-
-def test_what_no_pinned_layout_is_found_for_is_laid_out_with_less(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """And with nothing where no layout has the old hands; names are kept."""
-    monkeypatch.setattr("factory.apps.revise.pinning.AGAIN", 0)
-    old, new = project(example("truck")), project(van())
-    found = revised(old, new)
-    assert (found.asked, found.pinned) == ("all", "hands")
-    assert "--pin all: no layout found; this is that of --pin hands" in [*found.words()]
-
-    def refused(*_: object) -> None:
-        raise RunError(Diagnostic("Layout", "the old hands are in the way"))
-
-    monkeypatch.setattr("factory.apps.revise.revision.Hands", refused)
-    found = revised(old, new)
-    assert (found.pinned, found.new.layout.factory.robots[2].name) == ("none", "r5")
 
 
 def test_shared_robots_are_refused() -> None:
@@ -276,14 +156,6 @@ def test_a_family_has_what_is_equal_once_whatever_it_is_called(tmp_path: Path) -
     assert robots == [23, 23]
 
 
-def test_equal_names_with_other_content_are_told_apart(tmp_path: Path) -> None:
-    other = edited(van(), random.Random(2), 1, ("change",))
-    changed = next(n.label for n in other.nodes if n not in van().nodes)
-    made = family(example("truck"), other, (1, 1), tmp_path)
-    assert made.names[changed] == (f"{changed}.b" if changed in made.pag.by_label else changed)
-    assert read_pag(write_pag(made.pag), all_templates()) == made.pag
-
-
 def basic() -> PAG:
     """A gearbox without its wheel."""
     gearbox = example("gearbox")
@@ -292,13 +164,6 @@ def basic() -> PAG:
     inputs = tuple(x for x in made.inputs if x != "wheel")
     made = replace(made, label="basic", inputs=inputs)
     return replace(gearbox, root="basic", nodes=(made, *nodes.values()))
-
-
-def test_screws_that_come_to_one_place_on_two_lines_are_not_a_tee() -> None:
-    """Where one has to go further back, it gets a longer way."""
-    layout = project(basic()).layout
-    assert layout.certificate is not None and layout.certificate.holds
-    assert layout.stems == frozenset()
 
 
 def test_meshes_of_a_family_are_found_from_its_folder(tmp_path: Path) -> None:

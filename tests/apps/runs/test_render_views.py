@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -12,11 +10,10 @@ from factory.apps.log.model import model_of
 from factory.apps.monitor.record import recorded_subject
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import SHOWN, Replica
-from factory.engine.record.subject import MonitorSubject
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film.action import FAINT, SIGNS, Action, Fading, action_of, placed, shape_of
-from factory.film.camerawork import Camerawork, Take
+from factory.film.action import Action, Fading, action_of, placed
+from factory.film.camerawork import Take
 from factory.film.following import Viewpoint
 from factory.film.history import History
 from factory.film.junction import ZOOM, handover_of
@@ -24,14 +21,10 @@ from factory.film.picture import Picture, orbit
 from factory.film.shot import moment_of, recorded_take
 from factory.film.spotlight import DIM, DIMMER, Spotlight
 from factory.film.tour import BETWEEN, OPENING, STAYS, Tour
-from factory.film.vantage import hidden, overview
-from factory.floor.geometry.sight import Framing, View, fit, towards
+from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
-from factory.theory.problem.pag import NOPART
 from tests.examples import without_hands
-from tests.opengl import needs_gl
-from tests.pag_texts import laid_out
 
 WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)
 
@@ -86,9 +79,6 @@ def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
     return np.concatenate(found)
 
 
-# --- framing --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("camera", ["overview", "orbit", "top"])
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS, Framing(9 / 16, below=0.1)])
 def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera, framing) -> None:
@@ -99,27 +89,6 @@ def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera,
         assert np.abs(seen(view, moving(replica, moment.shown.qpos))).max() < 1
 
 
-def test_an_overview_is_from_where_the_shed_is_not_in_front(action) -> None:
-    """A shed before the south side is looked past, and with none there it is the south side."""
-    usual = fit(action.points, towards(-62.0, 40.0), WIDE)
-    ahead = usual.axes[2] * (1.0, 1.0, 0.0)
-    low, high = action.points.min(axis=0), action.points.max(axis=0)
-    wall = (low + high) / 2 - 0.6 * np.linalg.norm(high - low) * ahead
-    shed = (wall + 0.25 * SIGNS * (high - low))[None]
-    free = replace(action, shed=shed[:0], housings=shed[:0])
-    blocked = replace(free, shed=shed)
-    assert hidden(blocked, usual) > 0.2
-    assert hidden(blocked, overview(blocked, WIDE)) < 0.05
-    assert hidden(free, usual) == 0
-
-
-@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
-def test_the_frame_is_filled_one_way(replica, action, framing) -> None:
-    view = overview(action, framing)
-    filled = np.ptp(seen(view, action.framed), axis=0) / 2
-    assert filled.max() > 0.85
-
-
 def test_lifts_are_seen_up_and_down(replica, action) -> None:
     m = replica.m
     strokes = [2 * m.geom(g).size[1] for g in range(m.ngeom) if m.geom(g).name.endswith("/column")]
@@ -127,32 +96,6 @@ def test_lifts_are_seen_up_and_down(replica, action) -> None:
         pytest.skip("this factory has no lift")
     loads = action.robots[:, :, 2]
     assert np.ptp(loads, axis=1).max() > max(strokes)
-
-
-def test_a_fused_body_may_be_made_of_shells_alone() -> None:
-    """All its parts overlap what comes later, so each has a body of its own in it."""
-    layout = laid_out(
-        "root = all; all = mate(both, c); both = mate(a, b);"
-        "a = atomic(); b = atomic(pos = (0.05, 0, 0)); c = atomic(pos = (0.025, 0.02, 0))"
-    )
-    m = Simulation(layout, RunRequest(fuse=True)).physical.m
-    body = m.body(names.part("both", 1)).id
-    assert m.body_geomnum[body] == 0
-    assert np.ptp(shape_of(m, body), axis=0)[0] > 0.04
-
-
-def test_an_orbit_is_as_near_as_it_can_be_and_calm() -> None:
-    """A camera at an even distance is as far away everywhere as the widest side asks."""
-    points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
-    tight = Framing(16 / 9, 0.0, 0.0, 0.0)
-    look = orbit(points, tight)
-    views = [look(time) for time in np.arange(0.0, 45.0, 0.25)]
-    assert max(np.abs(seen(view, points)).max() for view in views) < 1.002
-    away = np.array([view.distance for view in views])
-    widest = max(fit(points, view.axes, tight).distance for view in views)
-    assert away.max() < 1.05 * widest and away.min() < 0.93 * away.max()
-    steps = np.abs(np.diff(away)) / away[1:]
-    assert steps.max() < 0.02 and np.abs(np.diff(away, 2)).max() < 0.01 * away.mean()
 
 
 @pytest.mark.parametrize("camera", ["product", "part:{}"])
@@ -166,9 +109,6 @@ def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, came
     assert eighths.shape == (8, 8, 3) and np.abs(seen(view, eighths.reshape(-1, 3))).max() < 1
     sizes = np.ptp(eighths, axis=1)
     assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
-
-
-# --- hand-overs -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
@@ -216,40 +156,6 @@ def _geoms_of(m: mujoco.MjModel, factory, label: str) -> list[int]:
     return [g for g in range(m.ngeom) if m.body(int(m.geom_bodyid[g])).name in bodies]
 
 
-def test_a_hand_over_is_seen_from_aside(take) -> None:
-    """No robot stands in front of it, or behind it, where it can be otherwise; what the view was
-    taken from is left as it was found."""
-    replica = Replica(take.m)
-    before = replica.d.qpos.copy()
-    for label in ("part1", "sub1"):
-        if label not in take.subject.factory.by_label:
-            return
-        view = handover_of(replica, take.subject, label, WIDE).view
-        assert (replica.d.qpos == before).all()
-        ahead = view.axes[2][:2] / np.linalg.norm(view.axes[2][:2])
-        taking = take.subject.factory.by_label["sub1" if label == "part1" else "sub2"]
-        held = zip(taking.robots, taking.before, taking.after, strict=True)
-        for robot in [robot for robot, *labels in held if set(labels) != {NOPART}]:
-            body = replica.m.body(names.carriage(take.subject.factory.robots[robot].name)).id
-            along = replica.d.xaxis[replica.m.body_jntadr[body]][:2]
-            assert abs(ahead @ along) < 0.9
-
-
-def test_a_small_part_is_seen_large() -> None:
-    """The frame of its hand-over is that of a pin, not of the plate it is put into."""
-    layout = laid_out(
-        "root = all; all = insert(plate, pin);"
-        "plate = atomic(box = (0.16, 0.12, 0.02));"
-        "pin = atomic(box = (0.008, 0.008, 0.012), pos = (0.05, 0.03, 0.016))"
-    )
-    simulation = Simulation(layout, RunRequest("mujoco"))
-    m, subject = simulation.physical.m, MonitorSubject.of_run(simulation)
-    near = handover_of(Replica(m), subject, "pin", WIDE)
-    at = seen(near.view, near.watched[0])
-    assert np.abs(at).max() < 0.5 and np.ptp(at[:, 1]) / 2 > 0.15
-    assert near.view.range[0] < 0.2 * near.view.distance  # nothing near is cut
-
-
 def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
     replica, factory = Replica(take.m), take.subject.factory
     m, before = replica.m, replica.m.geom_rgba.copy()
@@ -287,9 +193,6 @@ def test_robots_that_a_hand_over_does_not_concern_fade(log, take) -> None:
     assert {int(m.body_rootid[m.geom_bodyid[g]]) for g in out} <= others
     spotlight.aim(None, shown)
     assert (m.geom_rgba == before).all() and (m.geom_group == groups).all()
-
-
-# --- a tour ---------------------------------------------------------------------------------------
 
 
 def carriage_at(log: Log, take: Take, robot: str, time: float) -> Array:
@@ -338,57 +241,6 @@ def test_a_tour_cuts_at_events(log, take) -> None:
     assert output == {factory.robots[0].name} and whole < end <= whole + STAYS + 1 / 30
 
 
-@needs_gl
-def test_a_still_of_a_tour_is_the_overview(take) -> None:
-    with Camerawork(replace(take, picture=Picture((160, 90), renderer="classic")), 2) as work:
-        assert isinstance(work.painter.viewpoint, Viewpoint)
-        assert work.painter.viewpoint.handover is None
-    with Camerawork(replace(take, picture=Picture((160, 90), renderer="classic"))) as work:
-        assert isinstance(work.painter.viewpoint, Tour)
-
-
-# --- fading ---------------------------------------------------------------------------------------
-
-
-def opacity(replica: Replica, feeder: str) -> float:
-    """How opaque a feeder's post is."""
-    return float(replica.m.geom(f"{feeder}/post").rgba[3])
-
-
-def first_feeder(m: mujoco.MjModel) -> str:
-    posts = (m.geom(g).name for g in range(m.ngeom))
-    return next(name for name in posts if name.endswith("/post")).removesuffix("/post")
-
-
-def test_a_post_in_front_fades_and_one_behind_does_not(take) -> None:
-    replica = Replica(take.m)
-    fading, feeder = Fading(replica), first_feeder(take.m)
-    post = placed(replica.m, replica.d, replica.m.geom(f"{feeder}/post").id)
-    for azimuth in (-90.0, 0.0, 90.0, 180.0):
-        axes = towards(azimuth, 10.0)
-        ahead = np.array([axes[2][0], axes[2][1], 0.0])
-        view = fit(post, axes, WIDE)
-        fading.fade(view, (post + 0.3 * ahead)[None])
-        assert opacity(replica, feeder) < FAINT + 0.05
-        fading.fade(fit(post, axes, WIDE), (post - 0.3 * ahead)[None])
-        assert opacity(replica, feeder) == 1.0
-
-
-def test_what_fades_keeps_its_colour_and_robots_never_fade(take, action) -> None:
-    replica = Replica(take.m)
-    before = replica.m.geom_rgba.copy()
-    fading = Fading(replica)
-    fading.fade(overview(action, WIDE), action.robots)
-    changed = np.flatnonzero((replica.m.geom_rgba != before).any(axis=1))
-    faded = [g for g in changed if replica.m.geom_rgba[g, 3] < 1]
-    assert faded
-    m, material = replica.m, take.m.geom_matid
-    for g in changed:
-        assert names.kind(m.geom(g).name) in ("feeder", "outfeed")
-        worn = m.mat_rgba[material[g]] if material[g] >= 0 else before[g]
-        assert np.allclose(m.geom_rgba[g, :3], worn[:3])
-
-
 def test_fading_is_of_the_view_alone(take, action) -> None:
     """Films and stills, runs and logs show the same: what was seen before plays no part."""
     one, other = Replica(take.m), Replica(take.m)
@@ -398,15 +250,3 @@ def test_fading_is_of_the_view_alone(take, action) -> None:
         first.fade(look(time), action.robots)
     second.fade(look(31.0), action.robots)
     assert (one.m.geom_rgba == other.m.geom_rgba).all()
-
-
-def test_what_fades_in_an_orbit_takes_a_quarter_of_a_second_at_least(take, action) -> None:
-    replica = Replica(take.m)
-    fading, look = Fading(replica), orbit(action.points, WIDE)
-    last, steps = None, []
-    for time in np.arange(0.0, 45.0, 1 / 15):
-        fading.fade(look(float(time)), action.robots)
-        alpha = replica.m.geom_rgba[fading.geoms, 3].copy()
-        steps += [] if last is None else [np.abs(alpha - last).max()]
-        last = alpha
-    assert 0.01 < max(steps) < 0.3
