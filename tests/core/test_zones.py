@@ -196,3 +196,10 @@ def test_two_thousand_programs() -> None:
     assert alone > 0.25 * MANY
     assert seen > 0.2 * MANY
     assert dead > 0.1 * tried
+
+
+def test_the_certificate_of_shared_floor_agrees_with_all_its_markings() -> None:
+    alone, seen, dead, _ = try_programs(FEW)
+    assert alone > 0.25 * FEW, "without order places many stall, so the test could fail"
+    assert seen > 0.2 * FEW
+    assert dead > 0
