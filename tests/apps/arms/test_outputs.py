@@ -20,7 +20,6 @@ from factory.apps.exports.chain_rest import joints_at_rest
 from factory.apps.exports.stock import written
 from factory.apps.exports.writing import export, exporter
 from factory.apps.live.page import stage_of
-from factory.apps.log.plan_file import plan_files
 from factory.apps.recovery import recover
 from factory.engine.mjcf.loading import load
 from factory.engine.simulation.modelling import physical_model
@@ -168,10 +167,8 @@ def test_a_table_of_joints_needs_arms(run: Terminal) -> None:
         assert done.status == 2 and "is about arms" in done.err and "--arm six" in done.err
 
 
-def test_no_plan_or_recovery_of_a_cell_is_made_from_python(small: Project) -> None:
-    """Whoever asks: these are refused where they are made."""
-    with pytest.raises(FactoryError, match=r"a plan .* cannot be combined with --arm"):
-        plan_files(small, Path())
+def test_no_recovery_of_a_cell_is_made_from_python(small: Project) -> None:
+    """Whoever asks: it is refused where it is made."""
     made = Simulation(laid(small), RunRequest("ideal", 1, recovers=True))
     with pytest.raises(FactoryError, match=r"recovery .* cannot be combined"):
         recover(made)
