@@ -10,10 +10,9 @@ from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
 from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.turning import presented
-from factory.floor.layout.dimensions import PLAY
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.guidepath import Box
-from factory.floor.layout.outfeed import UPRIGHT, table
+from factory.floor.layout.outfeed import shed_with_uprights
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""
@@ -47,9 +46,8 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
         for label, solid in line.rails.product.solids.items():
             yield from _part(solid, placed_name(label, line), cell.placed(carrier))
         yield from _feeder_of(cell, carrier, bare)
-    mouth, back, low, high = bare.shed
-    top = max(at[2] + half[2] for _, at, half in table(bare)) + PLAY
-    yield upright("the outfeed's shed", (mouth - UPRIGHT, back, low, high), 0.0, top)
+    box, top = shed_with_uprights(bare)
+    yield upright("the outfeed's shed", box, 0.0, top)
     yield upright("the outfeed", bare.outfeed, 0.0, cell.top)
     for other, stand in cell.stands.items():
         if other != arm:

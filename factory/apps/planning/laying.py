@@ -221,14 +221,14 @@ class Layouts:
         aim: Aim,
         budget: Allowance,
         report: Callable[[LaidOut], None] = lambda _: None,
-        known: Sequence[LaidOut] = (),
+        before: Sequence[LaidOut] = (),
     ) -> LaidOut:
-        """The best of those that are `known` and some trees, or of those about as good the one that
+        """The best of those from `before` and some trees, or of those about as good the one that
         makes most sense. As many are laid out as the budget permits, at least one: those of LAID
         robots together, or as many as time permits, where the next one is assumed to take as long
         as the longest did; what is known to be worse before it is laid out counts as well. A
         KeyboardInterrupt, or OutOfTime, ends the layout of any but the first."""
-        every = [*known]
+        every = [*before]
         longest, robots = 0.0, 0
         for judged in trees:
             robots += judged.robots

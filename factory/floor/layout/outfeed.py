@@ -128,6 +128,14 @@ def table(layout: Layout) -> Iterator[Slab]:
         yield f"leg{side}", foot, (leg, leg, (BELT - thick) / 2)
 
 
+def shed_with_uprights(layout: Layout) -> tuple[Box, float]:
+    """The box of the shed with the uprights of its shutter, and the height of the top of these, or
+    of the shutter where that is up [m]."""
+    mouth, back, low, high = layout.shed
+    top = max(at[2] + half[2] for _, at, half in table(layout)) + PLAY
+    return (mouth - UPRIGHT, back, low, high), top
+
+
 def slot_of(layout: Layout) -> tuple[float, float, float] | None:
     """The slot through which the output robot's hand comes up to the product, about the product's
     middle: its end, as far as the robot can be pushed, and its sides [m]; None if the hand is not

@@ -101,7 +101,7 @@ class Feeders:
         while True:
             number = line[0] if len(line) == 1 else self._turn(line, self.supply.rounds())
             label = self._stations[number].label
-            if not self.supply.word.demand:
+            if self.supply.skips_none:
                 return number
             if not self.supply.skips(label):
                 return number if self.supply.is_known(label) else None

@@ -41,6 +41,11 @@ class Supply:
             return bool(self.word.makes(self.next[label]))
         return self.next[label] < max(self.word.most, self._begun[label])
 
+    @property
+    def skips_none(self) -> bool:
+        """Whether every unit is made."""
+        return not self.word.demand
+
     def skips(self, label: str) -> bool:
         """Whether the next unit is not made, so that the turn passes on."""
         skipped = self.word.makes(self.next[label]) is False
