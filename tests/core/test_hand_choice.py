@@ -14,6 +14,7 @@ from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.groups import LONG, PINNED, WAIT
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import held
+from factory.floor.layout.hands.kinds import ABOVE, BELOW
 from factory.floor.layout.hands.lowered import Lowered
 from factory.floor.layout.hands.one_hand import _cost
 from factory.floor.layout.hands.outermost import _on_edges
@@ -23,7 +24,7 @@ from tests.layout_values import paper_layout, table_pag
 
 
 def test_a_pin_and_a_wait_cost_and_a_wait_no_more_than_a_long_one() -> None:
-    hand = Hand("below", ((0.0, 0.0, 0.0),))
+    hand = Hand(BELOW, ((0.0, 0.0, 0.0),))
     waits = replace(hand, wait=0.1 * LONG / WAIT)
     late = replace(hand, wait=9.0 * LONG / WAIT)
     assert _cost(hand) == 0.0
@@ -44,7 +45,7 @@ def test_how_thick_a_plate_is_does_not_matter_to_places_on_it() -> None:
     for thick in (0.005, 0.1):
         values = {"box": (0.1, 0.06, thick), "density": 5.0 / thick}
         product = product_geometry(table_pag("x", ("x", "atomic", "", values)))
-        made.append(places(product, ("x",), (2, 1), "above", Loads.of(product, (("x",),), 0.0)))
+        made.append(places(product, ("x",), (2, 1), ABOVE, Loads.of(product, (("x",),), 0.0)))
     thin, thick = made
     assert len(thin) and (thin.at[:, :2] == thick.at[:, :2]).all()
 
@@ -55,12 +56,12 @@ def test_what_is_lowered_onto_a_place_is_in_the_way_there(monkeypatch: pytest.Mo
     frames = [((1, 0), (0, 1))]
     robot = next(r.index for r in layout.factory.robots if r.travels and r.index)
     label = held(layout.factory, robot)
-    at = looked.on_side(robot, "above", frames)
+    at = looked.on_side(robot, ABOVE, frames)
 
     def met(*ways: Any) -> Any:
         return np.arange(ways[0]) == 0 if len(ways) == 1 else hit(*ways)
 
     monkeypatch.setattr(Lowered, "beams", lambda _, robot, kind, at, u, t: [(len(at),)])
     monkeypatch.setattr(in_the_way, "hit", met)
-    free, _ = looked.checks(robot, label, "above", at, frames)
+    free, _ = looked.checks(robot, label, ABOVE, at, frames)
     assert free["lowered"].tolist() == [False, *[True] * (len(at) - 1)]
