@@ -13,7 +13,8 @@ from dataclasses import replace
 
 from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
 from factory.apps.arms.body import STEM_MASS, mass_of
-from factory.apps.arms.crew import RAILS, CellArm, dealt
+from factory.apps.arms.cell_arm import CellArm
+from factory.apps.arms.crew import RAILS, dealt
 from factory.apps.arms.model import ArmModel
 from factory.theory.lang.template_reader import read_template
 from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody

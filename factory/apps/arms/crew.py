@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from factory.api import Diagnostic, Factory, InputError, did_you_mean, usage_error
+from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.model import KINDS, ArmModel, own_arm
 
 KEYS = "type", "mjcf", "tool", "speed", "acceleration", "labels"
@@ -19,19 +19,6 @@ KEYS = "type", "mjcf", "tool", "speed", "acceleration", "labels"
 RAILS = "leave out --arm: rails make it"
 
 EXAMPLE = 'left = { type = "six", labels = ["lid"] }'
-
-
-@dataclass(frozen=True, slots=True)
-class CellArm:
-    """An arm of a cell.
-
-    Attributes:
-        name: what messages call it.
-        labels: what it places; without any, what no other arm is said to place, by turns.
-    """
-
-    name: str = ""
-    labels: tuple[str, ...] = ()
 
 
 def asked_arms(asked: str) -> tuple[ArmModel, tuple[CellArm, ...]]:

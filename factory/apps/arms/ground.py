@@ -19,7 +19,8 @@ from factory.api import (
     Settings,
 )
 from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
-from factory.apps.arms.crew import CellArm, arms_in, asked_arms
+from factory.apps.arms.cell_arm import CellArm
+from factory.apps.arms.crew import arms_in, asked_arms
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import KINDS, ArmModel
 

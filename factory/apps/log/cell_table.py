@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from factory.api import Project, usage_error
-from factory.apps.arms.crew import CellArm
+from factory.apps.arms.cell_arm import CellArm
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import pytest
 from factory.api import Diagnostic, RunError
 from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
-from factory.apps.arms.crew import CellArm
+from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.model import ArmModel
 from factory.apps.live.interventions import Interventions
 from factory.engine.simulation.request import RunRequest
