@@ -62,10 +62,10 @@ def build(
     writable(mjcf)
     writable_folder(output)
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
-    kept_values = defaults_for(options.file).values
+    defaults = defaults_for(options.file).values
     settings = options.settings()
     name = build_name(
-        options.file, {**asdict(options), **wanted, "settings": settings, "kept": kept_values}
+        options.file, {**asdict(options), **wanted, "settings": settings, "defaults": defaults}
     )
     kept = find_build(name)
     is_current = kept is not None

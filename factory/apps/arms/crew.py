@@ -99,16 +99,15 @@ def dealt(factory: Factory, kind: str, arms: Sequence[CellArm]) -> Iterator[int]
     first = [bool(takes.inputs or joins.carrier) for takes, *_, joins in ends]
     said = _said(arms, labels, first)
     free = [n for n, arm in enumerate(arms) if not arm.labels] or [*range(len(arms))]
-    shares, last, turn = [0] * len(arms), -1, dict[int, int]()
-    for label, is_first in zip(labels, first, strict=True):
-        shares[0 if is_first else said.get(label, 0)] += is_first or label in said
-    for robot, label, is_first in zip(order, labels, first, strict=True):
-        if not is_first and label not in said:
-            last = min(free, key=lambda arm: (shares[arm], arm == last))
-            shares[last] += 1
-        else:
-            last = 0 if is_first else said[label]
-        turn[robot.index] = last
+    fixed = [
+        0 if is_first else said.get(label) for label, is_first in zip(labels, first, strict=True)
+    ]
+    shares, last, turn = [fixed.count(arm) for arm in range(len(arms))], -1, dict[int, int]()
+    for robot, arm in zip(order, fixed, strict=True):
+        if arm is None:
+            arm = min(free, key=lambda one: (shares[one], one == last))
+            shares[arm] += 1
+        turn[robot.index] = last = arm
     if not all(shares):
         why = "all that is placed has to do with sub-assemblies, which one arm does"
         message = f"{len(arms)} arms: {why if all(first) else 'nothing is left for one of them'}"
@@ -128,11 +127,8 @@ def _said(arms: Sequence[CellArm], labels: Sequence[str], first: Sequence[bool])
         for label in arm.labels:
             if label not in labels:
                 hint = did_you_mean(label, labels, "parts")
-                raise InputError(
-                    Diagnostic(
-                        "NoCell", f"no arm places '{label}', as {arm.name} is to", None, hint
-                    )
-                )
+                message = f"no arm places '{label}', as {arm.name} is to"
+                raise InputError(Diagnostic("NoCell", message, None, hint))
             if number and label in bound:
                 message = f"{arm.name} cannot place '{label}', which has to do with a sub-assembly"
                 hint = f"give it to {arms[0].name}, beside which sub-assemblies are built"
