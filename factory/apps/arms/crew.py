@@ -127,7 +127,7 @@ def _said(arms: Sequence[CellArm], labels: Sequence[str], first: Sequence[bool])
         for label in arm.labels:
             if label not in labels:
                 hint = did_you_mean(label, labels, "parts")
-                message = f"no arm places '{label}', as {arm.name} is to"
+                message = f"no arm places '{label}', as {arm.name or 'one'} is to"
                 raise InputError(Diagnostic("NoCell", message, None, hint))
             if number and label in bound:
                 message = f"{arm.name} cannot place '{label}', which has to do with a sub-assembly"

@@ -24,6 +24,7 @@ from factory.api import (
     read_bytes,
     read_text,
     table_of,
+    usage_error,
     value_of,
 )
 from factory.apps.log.cell_table import cell_in
@@ -55,7 +56,11 @@ class PlanFile:
     ) -> Project:
         """The project for settings and a ground, with the layout beside the file where that is of
         this plan and for these; `warn` is told where it is not. Raises InputError."""
-        with _of_a_plan(self.path):
+        if "cell" in self.table and ground.floor is not None:
+            raise usage_error(
+                f"--floor: '{self.path}' is a cell, as large as its arm", "leave it out"
+            )
+        with _fitting(self.path), _of_a_plan(self.path):
             made = project_of(self.table, self.path.parent, settings, ground)
         if "cell" in self.table:
             return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -141,5 +142,17 @@ def test_the_plan_of_a_cell_makes_the_same(tmp_path: Path, run: Terminal) -> Non
     second = run("run", tmp_path / "out" / "plan.json", "--units", "2", "--json")
     assert first.status == second.status == 0
     assert first.json["events"] == second.json["events"]
-    refused = run("revise", tmp_path / "out" / "plan.json", file)
+    plan = tmp_path / "out" / "plan.json"
+    refused = run("revise", plan, file)
     assert refused.status == 2 and "revise cannot be combined with --arm" in refused.err
+    refused = run("run", plan, "--floor", "9x9")
+    assert refused.status == 2 and "is a cell, as large as its arm" in refused.err
+    table = json.loads(plan.read_text())
+    for key, value, code in (
+        *(("kind", "sixx", "BadPlan"), ("kind", 1, "BadPlan"), ("arms", 3, "BadPlan")),
+        *(("text", "<mujoco/>", "BadArm"), ("crew", [{"labels": ["lud"]}], "NoCell")),
+        *(("crew", [{}, {}], "BadPlan"), ("crew", {}, "BadPlan"), ("files", [], "BadPlan")),
+    ):
+        plan.write_text(json.dumps({**table, "cell": {**table["cell"], key: value}}))
+        done = run("check", plan)
+        assert done.status == 2 and f"{code} " in done.err, (key, done.err)
