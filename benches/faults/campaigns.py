@@ -23,7 +23,7 @@ KINDS = {
 }
 """The list of the Agile Robotics for Industrial Automation Competition, and bad joints."""
 
-UNITS, SEEDS = 3, 10
+UNITS, SEEDS = 3, 3
 
 
 def fault(kind: str, factory: Factory, unit: int, draw: random.Random) -> Deviation:

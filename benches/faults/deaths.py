@@ -23,23 +23,23 @@ what has been made in advance lasts."""
 
 
 def measure(quick: bool = False, kept: Kept = None) -> Iterator[dict[str, Any]]:
-    """Let die each robot at three times each, in both worlds."""
-    products, count = (PRODUCTS[:1], 1) if quick else (PRODUCTS, None)
+    """Let die each robot in both worlds, one after the other at the three times."""
+    products = PRODUCTS[:1] if quick else PRODUCTS
     trials = [
         Trial(
             product,
-            (Deviation("dead", robot=robot.name, at=at),),
+            (Deviation("dead", robot=robot.name, at=TIMES[product][turn]),),
             UNITS,
             turn,
-            f"{world} {robot.name} {at:g}",
+            f"{world} {robot.name} {TIMES[product][turn]:g}",
             1,
             SWAP,
             world=world,
         )
         for product in products
         for world in WORLDS
-        for turn, at in enumerate(TIMES[product][:count])
         for robot in project(product).factory.robots
+        for turn in [robot.index % len(TIMES[product])]
     ]
     for rows in tried_so_far(trials, kept):
         yield {"rows": rows}
@@ -84,8 +84,8 @@ def section(results: dict[str, Any]) -> str:
             "## Each robot dies",
             f"A robot dies as it begins its next operation after a time of about two cycles, of"
             f" {UNITS} units at jitter {JITTER:g}; nothing tells the supervisor but that the robot"
-            f" does not move. A spare comes {SWAP:g} s after that was found. Each robot dies at"
-            " three times, in a run of its own each. A tool that has come to its station stays"
+            f" does not move. A spare comes {SWAP:g} s after that was found. Each robot dies in"
+            " a run of its own, at one of three times. A tool that has come to its station stays"
             " there, so its death is often of no consequence: nothing was to be found then."
             f" *Interval*: mean of the last {LAST} between products, where a spare came; *off by*:"
             " from the prediction for the factory, at most.",

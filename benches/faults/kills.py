@@ -15,7 +15,7 @@ from tests.apps.resume.test_resume_faults import FACTORIES as FAILING
 from tests.apps.resume.test_resume_faults import FAULTS
 from tests.command_line import spawn
 
-KILLS = 5
+KILLS = 2
 
 RUNS = (*((words, "") for words in FACTORIES), *((words, FAULTS) for words in FAILING))
 """The words of each run, and the file of its faults, "" for none."""

@@ -10,7 +10,7 @@ from benches.tables import table
 from factory.apps.deviations import Deviation
 from factory.engine.simulation.request import WorldName
 
-UNITS = 600
+UNITS = 300
 """Units of each run."""
 
 REDONE, LOST = 0.05, 0.01

@@ -5,7 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Any
 
-from benches.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout
+from benches.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout, over_cores
 from benches.tables import table
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -49,8 +49,8 @@ def judged(name: str) -> dict[str, Any]:
 
 def measure(quick: bool = False) -> dict[str, Any]:
     """All products that are here."""
-    names = PRODUCTS[:2] if quick else PRODUCTS
-    return {"products": [judged(name) for name in names if is_here(name)]}
+    names = [*filter(is_here, PRODUCTS[:2] if quick else PRODUCTS)]
+    return {"products": over_cores(judged, names)}
 
 
 def section(results: dict[str, Any]) -> str:

@@ -260,7 +260,7 @@ def chosen(plan: Layout) -> list[int]:
 
 def measure(quick: bool = False) -> dict:
     """Starts in the domain of one mode of each template of each product."""
-    count, modes = (5 if quick else 100), []
+    count, modes = (5 if quick else 40), []
     for name in CAMPAIGN[:1] if quick else CAMPAIGN:
         plan = layout(name)
         for number in chosen(plan):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benches.fidelity.products import SMALL, layout
+from benches.fidelity.products import SMALL, layout, over_cores
 from benches.tables import table
 from factory.apps.deviations import Deviation, deviate
 from factory.engine.simulation.request import RunRequest
@@ -30,7 +30,7 @@ UNITS = 3
 SETTINGS = Settings(timestep=0.002)
 """Noise and delay act in every timestep: they mean something for one that is known."""
 
-SEEDS = 3
+SEEDS = 2
 JITTER = 0.3
 
 PUSH = 0.1
@@ -76,7 +76,7 @@ class Trial:
     error_mm: float | None
 
 
-def geometric(first: float, last: float, ratio: float = 2**0.25) -> tuple[float, ...]:
+def geometric(first: float, last: float, ratio: float = 2**0.5) -> tuple[float, ...]:
     """A grid of magnitudes from first to last, each `ratio` times the one before."""
     count = round(np.log(last / first) / np.log(ratio))
     return tuple(float(first * ratio**n) for n in range(count + 1))
@@ -141,8 +141,8 @@ KINDS = (
         tuple(2.0 * n for n in range(1, 26)),
         lambda s, ms, seed: [Deviation("delay", seconds=ms / 1e3)],
     ),
-    Kind("a robot slowed", "times", geometric(2, 64, 2**0.5), robot_by("slow"), True),
-    Kind("a robot held back", "times", geometric(2, 64, 2**0.5), robot_by("drag"), True),
+    Kind("a robot slowed", "times", geometric(2, 64), robot_by("slow"), True),
+    Kind("a robot held back", "times", geometric(2, 64), robot_by("drag"), True),
 )
 
 REQUIRED: tuple[tuple[str, float], ...] = (
@@ -257,24 +257,29 @@ def cost(found: Sequence[Trial], bases: Sequence[Trial]) -> dict:
 
 def measure(quick: bool = False) -> dict:
     """Every product under every kind: what must be survived, and the most that is."""
-    products = {}
-    for name in SMALL[:1] if quick else SMALL:
-        plan = layout(name)
-        robots = range(len(plan.factory.robots))
-        seeds = range(1 if quick else SEEDS)
-        base = {s: trial(plan, None, 0.0, s, False) for s in seeds}
-        required, most = [], []
-        for kind in KINDS:
-            chosen = robots if kind.each else seeds
-            bases = [base[0]] * len(robots) if kind.each else list(base.values())
-            for wanted, magnitude in REQUIRED:
-                if wanted == kind.name:
-                    found = [trial(plan, kind.make, magnitude, s, kind.each) for s in chosen]
-                    required.append(_required(kind, magnitude, found, bases))
-            if not quick:
-                most.append(search(plan, kind, chosen, bases))
-        products[name] = {"required": required, "largest": most}
+    names = SMALL[:1] if quick else SMALL
+    cases = [(name, number, quick) for name in names for number in range(len(KINDS))]
+    products = {name: {"required": [], "largest": []} for name in names}
+    for (name, *_), (required, most) in zip(cases, over_cores(tried, cases), strict=True):
+        products[name]["required"] += required
+        products[name]["largest"] += most
     return {"units": UNITS, "seeds": 1 if quick else SEEDS, "products": products}
+
+
+def tried(case: tuple[str, int, bool]) -> tuple[list[dict], list[dict]]:
+    """A product under a kind, by their name and number: what must be survived, and, unless `quick`,
+    the most that is."""
+    name, number, quick = case
+    plan, kind = layout(name), KINDS[number]
+    chosen = range(len(plan.factory.robots)) if kind.each else range(1 if quick else SEEDS)
+    seeds = [0] * len(chosen) if kind.each else chosen
+    base = {seed: trial(plan, None, 0.0, seed, False) for seed in sorted(set(seeds))}
+    bases, required = [base[seed] for seed in seeds], []
+    for wanted, magnitude in REQUIRED:
+        if wanted == kind.name:
+            found = [trial(plan, kind.make, magnitude, s, kind.each) for s in chosen]
+            required.append(_required(kind, magnitude, found, bases))
+    return required, [] if quick else [search(plan, kind, chosen, bases)]
 
 
 def _required(kind: Kind, magnitude: float, found: list[Trial], bases: Sequence[Trial]) -> dict:

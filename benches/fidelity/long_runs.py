@@ -1,6 +1,6 @@
 """Long runs: nothing drifts, and no copy of a part is lost.
 
-500 units of the paper's example and 50 of a real product, in one run each. For every unit: product
+300 units of the paper's example and 50 of a real product, in one run each. For every unit: product
 error, largest hand-off gap and weld residual since the last dropoff, and the interval. The first
 ten are the first after the factory has filled, the last ten the last before it runs empty.
 
@@ -28,7 +28,7 @@ from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 
-RUNS = ((PAPER, 500), *((name, 50) for name in REAL))
+RUNS = ((PAPER, 300), *((name, 50) for name in REAL))
 
 TEN = 10
 

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
 
 import factory
+from factory.apps.sweep.pool import cores, over_processes
 from factory.floor.layout.layout import Layout
+
+Item = TypeVar("Item")
+
+Result = TypeVar("Result")
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
@@ -47,6 +54,15 @@ def file_of(name: str) -> Path:
     """The PAG of an example, or of an LDraw product by the name of its file."""
     file = EXAMPLES / f"{name}.pag"
     return file if file.is_file() else BRICKS / f"{name}.pag"
+
+
+def over_cores(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """The results of `work` for all items, in their order, from as many processes as cores."""
+    found = dict[int, Result]()
+    for worked in over_processes(work, items, cores()):
+        assert worked.result is not None
+        found[worked.number] = worked.result
+    return [found[number] for number in range(len(items))]
 
 
 def is_here(name: str) -> bool:

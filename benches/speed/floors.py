@@ -65,7 +65,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
         partial(fresh, work, **asdict(case), window=1.0 if quick else window(case))
         for case in cases
     ]
-    found = interleaved(jobs, 2 if quick else 3)
+    found = interleaved(jobs, 2)
     return {
         "runs": len(found[0]),
         "rows": [

@@ -16,7 +16,7 @@ RIVALS = ROOT / ".rivals" / "bin" / "python"
 
 PROGRAM = ROOT / "benches" / "rivals" / "magbotsim_movers.py"
 
-COUNTS, TIMESTEPS = (1, 10, 40, 100), (0.001, 0.002)
+COUNTS, TIMESTEPS = (1, 10, 100), (0.001, 0.002)
 """Movers, and timesteps [s]: MagBotSim's own and ours."""
 
 WALL = 4.0
@@ -27,14 +27,14 @@ def measure(quick: bool = False) -> dict[str, Any]:
     """Both at every number and timestep, in turns."""
     if not RIVALS.is_file():
         return {"missing": "MagBotSim is not installed: call tools/rivals"}
-    counts = COUNTS[:3] if quick else COUNTS
+    counts = COUNTS[:2] if quick else COUNTS
     wall, window = (0.5, 0.5) if quick else (WALL, None)
     cases = [Case(count, timestep) for count in counts for timestep in TIMESTEPS]
     jobs = []
     for case in cases:
         jobs.append(partial(theirs, case.robots, case.timestep, wall))
         jobs.append(partial(fresh, work, **asdict(case), window=window))
-    found = interleaved(jobs, 2 if quick else 3)
+    found = interleaved(jobs, 2)
     rows = [
         {
             "movers": case.robots,

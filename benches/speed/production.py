@@ -49,7 +49,7 @@ CASES: Sequence[tuple[Case, float | None]] = tuple(
 LEAST = 10.0
 """Simulated at least [s] in steady production, and at least one cycle."""
 
-RUNS = 3
+RUNS = 2
 """Processes a case: other load on the machine shows in single ones."""
 
 MEMORY = 1500.0
@@ -104,7 +104,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
     cases = CASES[:2] if quick else CASES
     window = 1.0 if quick else None
     jobs = [partial(fresh, work, **asdict(case), window=window) for case, _ in cases]
-    found = interleaved(jobs, 2 if quick else RUNS)
+    found = interleaved(jobs, RUNS)
     return {
         "runs": len(found[0]),
         "rows": [

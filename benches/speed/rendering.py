@@ -28,7 +28,7 @@ from factory.support.engine import mujoco
 ROBOTS = (6, 40, 100)
 """The paper's example, and balanced trees."""
 
-FRAMES = 60
+FRAMES = 24
 
 SIZE = (1280, 720)
 
@@ -116,7 +116,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
     gl.prepare()  # the bare renderer chooses its GL when it is loaded, in the processes to come
     counts, frames = (ROBOTS[:2], 10) if quick else (ROBOTS, FRAMES)
     jobs = [partial(fresh, work, robots=count, frames=frames) for count in counts]
-    found = interleaved(jobs, 1 if quick else 3)
+    found = interleaved(jobs, 1 if quick else 2)
     rows = [
         {
             **median(own),

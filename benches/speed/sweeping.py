@@ -12,7 +12,7 @@ from typing import Any
 from benches.speed.processes import FACTORY, ROOT, interleaved, median, ratio, run, spread
 from benches.tables import table
 
-RUNS, JOBS = 1_000, (1, 2)
+RUNS, JOBS = 120, (1, 2)
 
 AIM, OVERHEAD = 1.8, 10.0
 """Times one core's rate; percent of a run's time."""
@@ -35,7 +35,7 @@ def swept(runs: int, jobs: int) -> dict[str, Any]:
 def measure(quick: bool = False) -> dict[str, Any]:
     """Both, in turns."""
     runs = 20 if quick else RUNS
-    found = interleaved([partial(swept, runs, jobs) for jobs in JOBS], 1 if quick else 3)
+    found = interleaved([partial(swept, runs, jobs) for jobs in JOBS], 1 if quick else 2)
     one, two = found
     return {
         "runs": runs,
