@@ -19,7 +19,7 @@ LABELS = (100, 1_000, 10_000, 100_000)
 LARGEST = 1_000
 """Labels of the largest PAG that is laid out."""
 
-ROBOTS = 1_000
+ROBOTS = 300
 """Of the factory that is built twice."""
 
 AIMS = (

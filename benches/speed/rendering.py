@@ -25,8 +25,8 @@ from factory.film.video import FPS
 from factory.support import gl
 from factory.support.engine import mujoco
 
-ROBOTS = (6, 40, 100)
-"""The paper's example, and balanced trees."""
+ROBOTS = (6, 40)
+"""The paper's example, and a balanced tree."""
 
 FRAMES = 24
 
