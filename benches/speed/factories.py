@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
+import pickle
 import tempfile
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 from benches.fidelity.products import EXAMPLES
 from factory.engine.record.verdict import RunVerdict, judged, kept_figures
@@ -19,6 +23,9 @@ from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support.settings import MOST, Settings
 from factory.theory.nets.replay import replay
+
+LAYOUTS = "FACTORY_BENCH_LAYOUTS"
+"""The environment's name of a folder in which a bench keeps layouts for all of its processes."""
 
 ENDLESS = 1000
 """Units asked for: more than the pool of parts ever needs, so that it is the whole pool."""
@@ -77,12 +84,16 @@ def robots_at_least(robots: int) -> str:
     return balanced(robots // 2 + 1)
 
 
-def laid_out(text: str, settings: Settings = DEFAULT) -> Layout:
-    """A PAG's factory on its floor."""
+def laid_out(text: str) -> Layout:
+    """A PAG's factory on its floor: laid out once by all processes of a bench."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "product.pag"
-        file.write_text(text)
-        return of_file(file, settings)
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        kept = Path(os.environ.get(LAYOUTS, folder)) / f"{digest}.pickle"
+        if not kept.is_file():
+            file = Path(folder) / "product.pag"
+            file.write_text(text)
+            kept.write_bytes(pickle.dumps(of_file(file)))
+        return cast(Layout, pickle.loads(kept.read_bytes()))
 
 
 def of_file(file: Path, settings: Settings = DEFAULT) -> Layout:

@@ -46,7 +46,6 @@ ROWS = (  # larger ones take longer than twenty minutes: docs/decisions/few-robo
     Wanted(EXAMPLES / "paper.pag", 3, 4.1),
     Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, seeds=3),
     Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, seeds=3),
-    Wanted(BRICKS / "4494-1-Imperial_Shuttle-Mini.pag", 50, 7.1, seeds=2),
 )
 
 
