@@ -28,7 +28,7 @@ LABELS = (2, 5, 7, 10, 20, 190, 1_900, 19_000)
 OFTEN = 10
 """Labels up to which all is done three times: beyond, the tools only run into the limit."""
 
-LIMIT, PATIENCE = 10.0, 3.0
+LIMIT, PATIENCE = 5.0, 3.0
 """A tool's time on a net [s]; it is ended from outside after this many times as long."""
 
 
