@@ -28,7 +28,6 @@ REPORT = Report(
         "sweeping",
         "rendering",
         "products",
-        "large",
     ),
     DOCS / "benchmarks.md",
     ("mujoco", "numpy", "scipy", "lark", "shapely"),

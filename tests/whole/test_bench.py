@@ -17,7 +17,7 @@ from benches.covering import chosen, listed
 from benches.faults.__main__ import REPORT as FAULTS
 from benches.fidelity import long_runs
 from benches.reporting import Report
-from benches.speed import large, processes
+from benches.speed import processes
 from benches.speed.__main__ import REPORT
 
 KEPT = [
@@ -86,13 +86,6 @@ def test_a_digest_of_the_physics_is_of_models_and_runs(
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not large.BRICKS.is_dir(), reason="the LDraw products are not here")
-def test_the_import_of_a_large_product_is_measured() -> None:
-    (found,) = large.measure(quick=True)
-    (row,) = found["rows"]
-    assert row["command"] == "import" and row["said"]["parts"] == 1253
-
-
 def test_a_manual_is_read_as_a_tree_of_parts() -> None:
     """Parts that are equal count as one kind; a step may name what is joined already."""
     chair = {"parts_ct": 5, "geometric_equivalence_relation": {"1": ["2", "3"], "0,1": ["0,2"]}}
