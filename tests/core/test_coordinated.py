@@ -21,6 +21,7 @@ from factory.theory.nets.coordinated import CoordinatedNet
 from factory.theory.nets.marked import MarkedNet, marked
 from tests.examples import with_hands
 from tests.random_products import random_product
+from tests.slow import slow_but
 from tests.token_game import dates
 
 HANDS = ("lamp", "stool", "truck", "chair")
@@ -65,7 +66,7 @@ def product_of(seed: int, folder: Path) -> Layout:
     return read(file).layout
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", slow_but([0, 1], range(6)))
 def test_it_is_the_compiled_net_with_more_that_restricts_it(seed: int, tmp_path: Path) -> None:
     layout = product_of(1200 + seed, tmp_path)
     net, compiled = coordinated(layout), marked(layout.factory.net)
@@ -74,7 +75,7 @@ def test_it_is_the_compiled_net_with_more_that_restricts_it(seed: int, tmp_path:
     assert net.net.is_marked_graph and not net.deadlock
 
 
-@pytest.mark.parametrize("name", HANDS)
+@pytest.mark.parametrize("name", slow_but(["stool"], HANDS))
 def test_one_unit_can_be_made_alone_and_everything_is_as_before(name: str) -> None:
     """Σ stays possible, whatever waits were added, and leads back to where it began."""
     layout = with_hands(name)
@@ -82,7 +83,7 @@ def test_one_unit_can_be_made_alone_and_everything_is_as_before(name: str) -> No
     assert fired(net.net, one_unit_alone(layout, net)) == list(net.net.tokens)
 
 
-@pytest.mark.parametrize("name", ["lamp", "truck"])
+@pytest.mark.parametrize("name", slow_but(["lamp"], ["lamp", "truck"]))
 def test_the_cycle_time_is_the_cycle_ratio(name: str) -> None:
     """Against the dates of a token game in which everything comes as soon as it can."""
     layout = with_hands(name)
@@ -93,7 +94,7 @@ def test_the_cycle_time_is_the_cycle_ratio(name: str) -> None:
     assert made.pace == pytest.approx(measured, rel=1e-6)
 
 
-@pytest.mark.parametrize("distributed", [False, True])
+@pytest.mark.parametrize("distributed", slow_but([False], [False, True]))
 def test_what_runs_is_what_was_proved(distributed: bool) -> None:
     """Each operation of a run starts when the hands that it waits for are past, by positions alone;
     without the orders some do not."""

@@ -30,6 +30,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.errors import InputError, MissingError
 from tests.examples import with_hands
+from tests.slow import slow_but
 
 
 @pytest.fixture
@@ -157,7 +158,7 @@ def models(name: str) -> tuple[mujoco.MjModel, mujoco.MjModel]:
     return m, drawn(m, made.xml, made.files, "overview")
 
 
-@pytest.mark.parametrize("name", DRESSED)
+@pytest.mark.parametrize("name", slow_but(["paper"], DRESSED))
 def test_bodies_are_where_those_of_the_run_are(name: str) -> None:
     m, seen = models(name)
     assert (m.nq, m.nbody, m.neq) == (seen.nq, seen.nbody, seen.neq)
@@ -206,7 +207,7 @@ def away(m: mujoco.MjModel, d: mujoco.MjData, geom: int, points: np.ndarray) -> 
     return np.linalg.norm(np.maximum(np.abs(at) - m.geom_size[geom], 0.0), axis=1)
 
 
-@pytest.mark.parametrize("name", DRESSED)
+@pytest.mark.parametrize("name", slow_but(["paper"], DRESSED))
 def test_nothing_drawn_lies_outside_what_is_solid(name: str) -> None:
     for geom, far in outside(*models(name)):
         assert far <= STANDS_OUT.get(geom, OUT) + 1e-5, geom

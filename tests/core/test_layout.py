@@ -42,6 +42,7 @@ from tests.layout_values import (
     with_path,
 )
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper
+from tests.slow import slow_but
 
 
 def test_the_same_input_gives_the_same_layout() -> None:
@@ -128,7 +129,7 @@ def laid_out(seed: int) -> Layout:
     return random_layout(7 + seed, seed, shape, style, True)
 
 
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", slow_but([0, 3], range(8)))
 def test_nothing_touches(number: int) -> None:
     """Two or three units, every robot with a speed and a gain of its own."""
     layout = laid_out(number)
@@ -156,7 +157,14 @@ def broken(layout: Layout, *words: str) -> Certificate:
     return found
 
 
-@pytest.mark.parametrize("drawn", DRAWN, ids=str)
+SMALL = [drawn for drawn in DRAWN if drawn[0] <= 3]
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [*SMALL, *(pytest.param(d, marks=pytest.mark.slow) for d in DRAWN if d not in SMALL)],
+    ids=str,
+)
 def test_every_layout_is_clear(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     assert layout.certificate is not None and layout.certificate.holds

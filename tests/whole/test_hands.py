@@ -68,6 +68,7 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     assert hidden.deepest() < AT_MOST_MM
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [-2e-3, 2e-3])
 def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
     """Each hand of the paper's example in turn: away from what it holds, and into it."""

@@ -101,7 +101,9 @@ def test_every_stage_gives_the_same_run() -> None:
     plan = factory.compile(pag)
     layout = factory.lay_out(plan)
     stages = (str(PAPER), PAPER, pag, plan, layout, read(PAPER))
-    runs = [factory.run(stage, units=2, seed=3, jitter=0.2).events for stage in stages]
+    runs = [
+        factory.run(stage, world="ideal", units=2, seed=3, jitter=0.2).events for stage in stages
+    ]
     assert all(run == runs[0] for run in runs)
 
 
@@ -115,8 +117,8 @@ def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
             tmp_path / "function" / name
         ).read_bytes()
         assert same, name
-    again = factory.run(tmp_path / "function" / "plan.json", units=2)
-    assert again.events == factory.run(PAPER, units=2).events
+    again = factory.run(tmp_path / "function" / "plan.json", world="ideal", units=2)
+    assert again.events == factory.run(PAPER, world="ideal", units=2).events
 
 
 def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
@@ -208,6 +210,7 @@ def cells() -> list[str]:
 
 
 @needs_gl
+@pytest.mark.slow
 def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT / "docs")
     names: dict[str, Any] = {}

@@ -24,6 +24,7 @@ from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import Terminal
 from tests.paths import PAPER, TESTS
+from tests.slow import slow_but
 
 FOLDER = TESTS / "baselines"
 EXAMPLES = FOLDER.parent.parent / "examples"
@@ -102,10 +103,7 @@ def kept(name: str) -> Mapping[str, float | None]:
     return dict(json.loads(path.read_text("utf-8"))["figures"])
 
 
-LARGE = {"gearbox": pytest.param("gearbox", marks=pytest.mark.slow)}
-
-
-@pytest.mark.parametrize("name", [LARGE.get(name, name) for name in PRODUCTS])
+@pytest.mark.parametrize("name", slow_but(["paper", "unary"], PRODUCTS))
 def test_figures_stay_within_tolerance(name: str, request: pytest.FixtureRequest) -> None:
     found = {key: rounded(value) for key, value in figures(name).items()}
     if request.config.getoption("--update-golden"):
