@@ -18,6 +18,7 @@ from tests.command_line import Terminal
 from tests.pag_texts import TEMPLATES
 from tests.paths import ROOT
 from tests.planted import CLOSED
+from tests.slow import slow_but
 
 CASES = ROOT / ".." / "shared" / "cases"
 
@@ -57,7 +58,10 @@ def test_an_overlap_is_named_and_fails_a_run(run: Terminal, deep: Path, tmp_path
 
 @pytest.mark.parametrize(
     ("allow", "said"),
-    [((), True), (("core:front",), False), (("front:core:36mm",), False), (("34mm",), True)],
+    slow_but(
+        [((), True)],
+        [((), True), (("core:front",), False), (("front:core:36mm",), False), (("34mm",), True)],
+    ),
 )
 def test_a_run_says_that_ways_were_blocked_unless_they_are_allowed(
     run: Terminal, tmp_path: Path, allow: tuple[str, ...], said: bool

@@ -49,8 +49,8 @@ from tests.fold_values import (
 )
 from tests.net_values import legal_markings, net_from
 from tests.pag_values import catalogue, paper, random_pag
-from tests.state_space import explored
 from tests.slow import slow_but
+from tests.state_space import explored
 
 Json = dict[str, Any]
 SMALL = 1_200

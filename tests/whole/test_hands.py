@@ -25,6 +25,7 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
 from tests.layout_values import with_visits
 from tests.paths import EXAMPLES, ROOT
+from tests.slow import slow_but
 
 AT_MOST_MM = 0.1
 """Nothing that is drawn is deeper in anything."""
@@ -49,15 +50,7 @@ def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetra
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "paper",
-        "lamp",
-        "stool",
-        pytest.param("truck", marks=pytest.mark.slow),
-        pytest.param("chair", marks=pytest.mark.slow),
-        pytest.param("balanced", marks=pytest.mark.slow),
-    ],
+    "name", slow_but(["paper"], ["paper", "lamp", "stool", "truck", "chair", "balanced"])
 )
 def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     simulation, hidden = looked_at(with_hands(name))

@@ -39,8 +39,8 @@ from tests.export_values import (
 from tests.export_values import write as written
 from tests.good_runs import assert_good
 from tests.paths import PAPER, ROOT
-from tests.structured_text import Plc
 from tests.slow import slow_but
+from tests.structured_text import Plc
 
 DOCUMENT = ROOT / "docs" / "exports.md"
 

@@ -178,8 +178,8 @@ FAULTS: dict[str, tuple[Alter, set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["paper", pytest.param("meshes", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("name", slow_but(["paper"], ["paper", "meshes"]))
+@pytest.mark.parametrize("fault", slow_but(["a shifted site", "a wrong mass"], FAULTS))
 def test_a_planted_fault_is_caught(name: str, fault: str) -> None:
     alter, expected = FAULTS[fault]
     told = deviations(figures(name, alter), kept(name))
