@@ -1,7 +1,6 @@
-"""Regression: the figures of some products against what is kept in tests/baselines.
-
-`make golden`, or pytest --update-golden, renews them: review the diff.
-"""
+"""Regression: the figures of some products against what is kept in tests/baselines. `make golden`,
+or pytest --update-golden, renews them: review the diff. Every figure of fidelity against known
+values, and against planted faults."""
 
 from __future__ import annotations
 
@@ -15,10 +14,10 @@ from pathlib import Path
 import pytest
 
 import factory
-from factory.apps.fidelity import QUANTITIES, measure_seed
+from factory.apps.fidelity import QUANTITIES, SeedRecord, measure_seed
 from factory.apps.fidelity.comparing import Alter, Case
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.fidelity.record import Figures
+from factory.apps.fidelity.record import Fidelity, Figures
 from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
@@ -277,3 +276,11 @@ def test_the_deepest_of_all_times_and_copies_is_kept() -> None:
     assert (found.geoms, found.time_s) == (("part/b#1", "part/b#2"), 0.1)
     assert found.depth_mm == hidden.deepest() == pytest.approx(90, abs=0.01)
     assert str(found) == "90.000 mm: part/b#1 - part/b#2, at 0.10 s"
+
+
+@pytest.mark.parametrize(
+    ("units", "words"), [((4, 4), "2 seeds, 4 units"), ((9, 4, 61), "3 seeds, 4 to 61 units")]
+)
+def test_runs_are_counted_from_the_fewest_units_to_the_most(units, words: str) -> None:
+    seeds = tuple(SeedRecord(seed, count, {}) for seed, count in enumerate(units))
+    assert Fidelity("x", 3, 0.3, seeds).runs == words
