@@ -119,7 +119,7 @@ def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> N
     assert one == other
 
 
-@pytest.mark.parametrize("name", slow_but(["lamp", "peg"], EXAMPLES))
+@pytest.mark.parametrize("name", slow_but(["lamp"], EXAMPLES))
 def test_examples_check(run: Terminal, name: str) -> None:
     done = run("check", ROOT / "examples" / f"{name}.pag", "--json")
     assert done.status == 0

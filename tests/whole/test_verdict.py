@@ -52,7 +52,7 @@ def failed(run: Terminal, *more: object) -> set[str]:
     return {failure["code"] for failure in verdict["failures"]}
 
 
-@pytest.mark.parametrize("name", slow_but(["paper", "peg"], EXAMPLES))
+@pytest.mark.parametrize("name", slow_but(["paper"], EXAMPLES))
 @pytest.mark.parametrize(
     ("seed", "fuse"), slow_but([(1, True)], [(0, False), (1, False), (1, True)])
 )
