@@ -52,6 +52,7 @@ from tests.layout_values import (
     shortened,
     table_pag,
     with_path,
+    with_visits,
 )
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper
 from tests.slow import slow_but
@@ -226,6 +227,21 @@ def test_an_insertion_with_a_wrong_standoff(monkeypatch: pytest.MonkeyPatch) -> 
     broken(layout, "mm nearer than they may at the end of")
     monkeypatch.setattr(Layout, "standoff", lambda self, operation, slot: 2.0)
     broken(layout, "it could never start")
+
+
+def test_a_station_moved_onto_its_neighbour() -> None:
+    layout = row_of_inserts()
+    factory = layout.factory
+    inserts = [o for o in factory.operations if o.template.name == "insert"]
+    later, sooner = inserts[0], inserts[2]
+    station = layout.guidepaths[sooner.carrier].length - layout.station(sooner.index)
+    moved = with_visits(layout, {later.index: station})
+    broken(moved, "away from the junction", later.label)
+    guest = later.robots[1]
+    on = layout.guidepaths[later.carrier]
+    both = with_path(moved, guest, a=on.middle(on.length - station))
+    neighbour = factory.robots[sooner.robots[1]].name
+    broken(both, factory.robots[guest].name, neighbour, "cross")
 
 
 def test_guidepaths_that_cross_or_leave_the_grid() -> None:
