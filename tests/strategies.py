@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from typing import Any
 
 from hypothesis import strategies as st
@@ -101,27 +100,6 @@ def _part(draw: st.DrawFn, name: str, meshes: tuple[str, ...]) -> Assembly:
 def _made(draw: st.DrawFn, name: str, inputs: list[str]) -> Assembly:
     operation, parameters = draw(_operation(len(inputs)))
     return Assembly(name, operation, tuple(inputs), parameters)
-
-
-def random_pag_text(labels: int, seed: int) -> str:
-    """The text of a random PAG with so many labels, made fast: binary mates, at most one weld."""
-    rng = random.Random(seed)
-    parts = (labels + 1) // 2
-    pool = [f"part{i}" for i in range(1, parts + 1)]
-    lines = [f"{name} = atomic();" for name in pool]
-    if labels % 2 == 0:
-        lines.append(f"welded = weld ( {pool[0]} );")
-        pool[0] = "welded"
-    for number in range(1, parts):
-        chosen = []
-        for _ in range(2):
-            at = rng.randrange(len(pool))
-            pool[at], pool[-1] = pool[-1], pool[at]
-            chosen.append(pool.pop())
-        pool.append(f"sub{number}")
-        lines.append(f"sub{number} = mate ( {', '.join(chosen)} );")
-    rng.shuffle(lines)
-    return "\n".join([f"{labels} parts;", f"root = {pool[0]};", *lines]) + "\n"
 
 
 values: st.SearchStrategy[Value] = st.one_of(

@@ -11,8 +11,8 @@ from typing import Any
 
 from benches.speed.factories import robots_at_least
 from benches.speed.processes import FACTORY, fresh, interleaved, median, resident, run, serve
+from benches.speed.states import random_pag_text
 from benches.tables import table
-from tests.strategies import random_pag_text
 
 LABELS = (100, 1_000, 10_000, 100_000)
 

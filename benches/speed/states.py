@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -13,7 +14,6 @@ from typing import Any
 from benches.speed.movers import RIVALS
 from benches.speed.processes import FACTORY, ROOT, interleaved, median, run
 from benches.tables import table
-from tests.strategies import random_pag_text
 
 TOOLS = {"SNAKES": "snakes_states.py", "pm4py": "pm4py_states.py"}
 
@@ -30,6 +30,27 @@ OFTEN = 10
 
 LIMIT, PATIENCE = 5.0, 3.0
 """A tool's time on a net [s]; it is ended from outside after this many times as long."""
+
+
+def random_pag_text(labels: int, seed: int) -> str:
+    """The text of a random PAG with so many labels, made fast: binary mates, at most one weld."""
+    rng = random.Random(seed)
+    parts = (labels + 1) // 2
+    pool = [f"part{i}" for i in range(1, parts + 1)]
+    lines = [f"{name} = atomic();" for name in pool]
+    if labels % 2 == 0:
+        lines.append(f"welded = weld ( {pool[0]} );")
+        pool[0] = "welded"
+    for number in range(1, parts):
+        chosen = []
+        for _ in range(2):
+            at = rng.randrange(len(pool))
+            pool[at], pool[-1] = pool[-1], pool[at]
+            chosen.append(pool.pop())
+        pool.append(f"sub{number}")
+        lines.append(f"sub{number} = mate ( {', '.join(chosen)} );")
+    rng.shuffle(lines)
+    return "\n".join([f"{labels} parts;", f"root = {pool[0]};", *lines]) + "\n"
 
 
 def measure(quick: bool = False) -> dict[str, Any]:

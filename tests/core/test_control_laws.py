@@ -1,4 +1,6 @@
-"""The table of control laws: from a template and its guidepaths to a mode."""
+"""The table of control laws: from a template and its guidepaths to a mode. Predicted times against
+the field and the governor, integrated. The governor: exact landing under the limits, for any speed,
+acceleration and tick."""
 
 from __future__ import annotations
 
@@ -12,13 +14,14 @@ from hypothesis import strategies as st
 
 from factory.support.arrays import Array
 from factory.support.errors import InputError
-from factory.theory.control.governed import GovernedAxis, mode_ticks, trajectories
-from factory.theory.control.governor import follow
+from factory.theory.control.governed import GovernedAxis, Trajectory, mode_ticks, trajectories
+from factory.theory.control.governor import follow, govern
 from factory.theory.control.laws import LAWS, Setting, law_of
 from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.problem.template import Law, Point, Template
+from tests.navigation_functions import potential
 
 MATE = Template(
     name="mate",
@@ -191,3 +194,53 @@ def test_waiting_takes_a_tick_or_its_dwell() -> None:
     ways = trajectories(Mode.still(2), np.zeros(2), limits, drive)
     assert mode_ticks(Mode.still(2), ways, 0.01) == 1
     assert mode_ticks(replace(Mode.still(2), dwell=0.25), ways, 0.01) == 25
+
+
+def test_a_way_is_done_with_a_ramp_at_each_end() -> None:
+    """0.25 s each, at half of 0.5 m/s; with a speed at the start the first one is shorter."""
+    assert SpeedProfile().rest(1.0) == pytest.approx(2 * 0.25 + (1.0 - 2 * 0.0625) / 0.5)
+    assert SpeedProfile().rest(1.0, 0.5) == pytest.approx(0.25 + (1.0 - 0.0625) / 0.5)
+
+
+def test_an_axis_rests_once_it_is_both_near_and_slow() -> None:
+    way = Trajectory((0.3, 0.1, 0.0, 0.0), (0.2, 0.1, 0.0, 0.0), (0.2, 0.2, 0.1, 0.0))
+    assert (way.within(0.05), way.rests(0.05), way.rests(0.05, still=0.5)) == (2, 3, 2)
+
+
+def test_limits_hold_along_governed_runs_of_many_modes() -> None:
+    """Insertions with jittered limits: limits, domain, gate and goal, tick by tick."""
+    rng, count, dt = np.random.default_rng(0), 100, 2e-3
+    r = 0.06
+    mode = Mode(
+        goals=np.array([0.5, 2 * r]),
+        lower=np.zeros(2),
+        upper=np.array([1.5, 1.5]),
+        eps=EPS,
+        pairs=np.array([[0, 1]]),
+        meet=np.array([[0.5 - 2 * r, 0.0]]),
+        touch=np.array([r]),
+        gate=np.array([-1, 0]),
+        standoff=np.array([0.0, 0.3]),
+    )
+    limits = [Limits(rng.uniform(0.3, 1.0, 2), rng.uniform(1, 5, 2)) for _ in range(count)]
+    bundle = Bundle.of([mode] * count, limits)
+    x = np.ravel([rng.uniform(0.3, 1.5, count), rng.uniform(2 * r + 0.3, 1.5, count)], order="F")
+    xs, vs, accelerations = run(bundle, x, dt, 9.0)
+    assert (np.abs(vs) <= bundle.speed + 1e-12).all()
+    assert (np.abs(accelerations) <= bundle.acceleration * (1 + 1e-9)).all()
+    assert all(bundle.in_domain(x).all() for x in xs)
+    assert bundle.at_goal(xs[-1]).all() and np.abs(vs[-1]).max() < 1e-9
+    steps = np.diff([potential(bundle, x) for x in xs], axis=0)
+    assert (steps <= 1e-12).all()
+
+
+def test_planted_field_that_brakes_too_late_is_caught() -> None:
+    """The governor brakes half as hard as the field assumes: the reference passes its target."""
+    one = np.ones(2)
+    bundle, dt = couriers(one, one, 2 * one), 2e-3
+    x, v = 1.0 - bundle.goal, np.zeros(2)
+    passed = False
+    for _ in range(1000):
+        x, v, _ = govern(x, v, bundle.field(x + v * (dt / 2), dt), bundle.acceleration / 2, dt)
+        passed |= bool(x[0] > 1.0 + EPS)
+    assert passed

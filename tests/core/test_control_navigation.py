@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +16,7 @@ from factory.theory.control.mode import Limits, Mode
 from factory.theory.control.navigation import Bundle
 from tests.navigation_functions import gradient as gradient_of
 from tests.navigation_functions import potential
+from tests.slow import slow_but
 
 R, EPS, DT = 0.06, 1e-3, 1e-3
 Field = Callable[[Array, float], Array]
@@ -125,7 +125,7 @@ def faults(bundle: Bundle, x: Array, field: Field | None = None, seconds: float 
     return found
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("case", slow_but(["mate", "insert"], CASES))
 def test_descends_to_the_goal_inside_the_domain(case: str) -> None:
     rng = np.random.default_rng(1)
     bundle = bundle_of(random_modes(case, 200, rng))
@@ -188,14 +188,6 @@ def test_batch_equals_one_by_one(case: str) -> None:
             assert np.allclose(whole[number], part[0], rtol=1e-12)
 
 
-def test_a_clock_is_looked_at_where_one_has_to_run_out() -> None:
-    still, long = Mode.still(2), replace(Mode.still(1), dwell=0.5)
-    both = bundle_of([still, long])
-    assert both.dwells and not bundle_of([still]).dwells
-    for chosen in ([0], [1], [1, 0]):
-        assert both.select(chosen).dwells == (1 in chosen)
-
-
 def test_phi_is_0_at_the_goal_and_1_on_the_obstacles() -> None:
     mode = mate(np.array([1.0, 1.2, 0.8]))
     bundle = bundle_of([mode])
@@ -230,57 +222,6 @@ def test_waiting_modes_stand_still_anywhere() -> None:
     assert potential(bundle, x)[0] == 0.0
     assert bundle.at_goal(x).tolist() == [True, False]
     assert bundle.in_domain(x).tolist() == [True, True]
-
-
-def test_an_empty_bundle_answers_with_empty_arrays() -> None:
-    bundle, nothing = Bundle.of([], []), np.empty(0)
-    for answer in (bundle.field(nothing, DT), potential(bundle, nothing), bundle.at_goal(nothing)):
-        assert answer.size == 0
-    assert gradient_of(bundle, nothing).size == bundle.in_domain(nothing).size == 0
-
-
-def test_a_mode_ends_in_the_goal_ball_when_its_clock_has_run_out() -> None:
-    bundle = bundle_of([Mode(np.ones(1), np.zeros(1), np.ones(1), EPS, dwell=2 * DT)])
-    inside, outside = bundle.at_goal(np.ones(1)), bundle.at_goal(np.array([0.5]))
-    for ticks, expected in ((0, False), (1, False), (2, True)):
-        assert bundle.finished(inside, np.full(1, ticks * DT)) == [expected]
-    assert bundle.finished(outside, np.full(1, 2 * DT)) == [False]
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.integers(1, 4), st.floats(0.0, 0.02), st.integers(0, 2**32 - 1))
-def test_a_mode_is_near_before_it_is_there(count: int, within: float, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    bundle = bundle_of([mate(rng.uniform(0.5, 2, 2)) for _ in range(count)])
-    x = np.concatenate([mode.upper for mode in bundle.modes])
-    assert not bundle.near_goal(x, within)
-    while not bundle.near_goal(x, within):
-        x = x + bundle.field(x, DT) * DT
-    away = np.maximum.reduceat(np.abs(x - bundle.goal), bundle.starts)
-    assert any(way < mode.eps + within for way, mode in zip(away, bundle.modes, strict=True))
-    assert bundle.near_goal(x, 0.0) == bundle.at_goal(x).any()
-    near = np.logical_and.reduceat(np.abs(x - bundle.goal) < EPS + within, bundle.starts)
-    for clocked in (near, near & (np.arange(count) != near.argmax())):
-        others = replace(bundle, clocked=clocked)
-        assert others.near_goal(x, within) == (near & ~clocked).any()
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.lists(st.integers(1, 5), min_size=1, max_size=8), st.integers(0, 2**32 - 1))
-def test_a_selection_is_the_bundle_of_the_selected(sizes: list[int], seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    modes = [Mode(rng.random(size), np.zeros(size), np.ones(size), EPS) for size in sizes]
-    chosen = [int(n) for n in rng.permutation(len(modes))[: rng.integers(1, len(modes) + 1)]]
-    found, expected = bundle_of(modes).select(chosen), bundle_of([modes[n] for n in chosen])
-    for name in Bundle.__dataclass_fields__:
-        one, other = getattr(found, name), getattr(expected, name)
-        if name in ("gates", "pairs"):
-            for inner in type(other).__dataclass_fields__:
-                assert np.array_equal(getattr(one, inner), getattr(other, inner)), (name, inner)
-        elif name != "modes":
-            assert np.array_equal(one, other), name
-    x = rng.random(sum(modes[n].size for n in chosen))
-    assert np.array_equal(found.field(x, DT), expected.field(x, DT))
 
 
 @settings(max_examples=200, deadline=None)

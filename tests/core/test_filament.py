@@ -1,4 +1,6 @@
-"""Filament draws stills where Vulkan works; elsewhere everything is as without it."""
+"""Filament draws stills where Vulkan works; elsewhere everything is as without it. What is drawn:
+rounded boxes, and nothing without a GL. The drawn model moves as the run's does, and nothing drawn
+lies outside what is solid."""
 
 from __future__ import annotations
 
@@ -19,17 +21,19 @@ from factory.engine.mjcf.robot_bodies import DIGITS, STROKES
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film import dress, filament, studio
+from factory.film import dress, filament, painter, studio
 from factory.film.drawn import drawn
 from factory.film.lettering import GLYPHS, height, lettering
 from factory.film.outfits import OUT
 from factory.film.picture import Picture
+from factory.film.skins import rounded
 from factory.film.smoothing import smooth
 from factory.floor.geometry.sight import View
 from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
-from factory.support.errors import InputError, MissingError
+from factory.support.errors import Diagnostic, InputError, MissingError
 from tests.examples import with_hands
+from tests.slow import slow_but
 
 
 @pytest.fixture
@@ -157,7 +161,7 @@ def models(name: str) -> tuple[mujoco.MjModel, mujoco.MjModel]:
     return m, drawn(m, made.xml, made.files, "overview")
 
 
-@pytest.mark.parametrize("name", DRESSED)
+@pytest.mark.parametrize("name", slow_but(["paper"], DRESSED))
 def test_bodies_are_where_those_of_the_run_are(name: str) -> None:
     m, seen = models(name)
     assert (m.nq, m.nbody, m.neq) == (seen.nq, seen.nbody, seen.neq)
@@ -206,7 +210,7 @@ def away(m: mujoco.MjModel, d: mujoco.MjData, geom: int, points: np.ndarray) -> 
     return np.linalg.norm(np.maximum(np.abs(at) - m.geom_size[geom], 0.0), axis=1)
 
 
-@pytest.mark.parametrize("name", DRESSED)
+@pytest.mark.parametrize("name", slow_but(["paper"], DRESSED))
 def test_nothing_drawn_lies_outside_what_is_solid(name: str) -> None:
     for geom, far in outside(*models(name)):
         assert far <= STANDS_OUT.get(geom, OUT) + 1e-5, geom
@@ -255,3 +259,30 @@ def test_what_is_flat_stays_as_it_is() -> None:
     picture = np.full((30, 40, 3), 200, np.uint8)
     picture[:, 20:] -= 5
     assert np.array_equal(smooth(picture), picture)
+
+
+@pytest.mark.parametrize("bevel", [0.001, 0.5])
+def test_a_rounded_box_is_as_large_as_the_box(bevel: float) -> None:
+    half = np.array([0.3, 0.2, 0.01])
+    skin = rounded(*half.tolist(), bevel)
+    corners = np.abs(skin.at)
+    assert corners.max(axis=0) == pytest.approx(half)
+    assert (corners > 0.5 * half - 1e-12).all()
+
+
+def test_without_a_gl_nothing_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    def probe() -> None:
+        raise MissingError(Diagnostic("Missing", "no GL", None, "install one"))
+
+    monkeypatch.setattr(painter.gl, "probe", probe)
+    with pytest.raises(MissingError):
+        painter.Painter(*[None] * 5)  # type: ignore[arg-type]
+
+
+"""The solids that a housing is drawn in the stead of."""
+
+
+def test_walls_are_not_drawn_where_a_housing_is() -> None:
+    _, seen = models("paper")
+    walls = [n for n in range(seen.ngeom) if seen.geom(n).name.rpartition("/")[2] in WALLS]
+    assert walls and (seen.geom_group[walls] == SHOWN).all()

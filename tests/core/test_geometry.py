@@ -1,4 +1,5 @@
-"""Solids: extents, mass and inertia against trimesh; meshes that the engine could not use."""
+"""Solids: extents, mass and inertia against trimesh; meshes that the engine could not use. Solids
+as drawn: what two have in common, by how much, and what one sweeps."""
 
 from __future__ import annotations
 
@@ -10,6 +11,7 @@ import trimesh
 
 from factory.floor.geometry.limits import METRES
 from factory.floor.geometry.meshes import MOST_FACES, usable
+from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError
@@ -87,3 +89,11 @@ def test_only_a_mesh_is_suspected_of_millimetres(tmp_path: Path) -> None:
     for edge, advice in ((20.0, "write unit = mm;"), (0.002, f"{METRES}: check")):
         (found,) = from_mesh(tmp_path, trimesh.creation.box((edge, edge, edge))).warnings
         assert advice in found.hint
+
+
+def test_an_overlap_that_is_all_facets_is_said_to_be_and_may_be_allowed() -> None:
+    for sagitta, is_facets in ((1e-4, False), (2e-4, True), (3e-4, True)):
+        fault = Overlapping("peg", "hole", 2e-4, sagitta).fault(())
+        assert fault is not None
+        assert ("may be their facets" in fault.message) == is_facets
+        assert (fault.hint or "").endswith(f"peg:hole:{1e3 * sagitta:g}mm") == is_facets

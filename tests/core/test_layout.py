@@ -1,5 +1,5 @@
-"""The layout: what it says of the paper's example, of floors and payloads, and of what it
-builds."""
+"""The layout: what it says of the paper's example, of floors and payloads, and of what it builds.
+What a hand costs, where pads and tips may be, and what is in their way."""
 
 from __future__ import annotations
 
@@ -22,6 +22,17 @@ from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.dimensions import ARMS, SIDE, Clearance
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.footprint import footprint
+from factory.floor.layout.hands import in_the_way
+from factory.floor.layout.hands.choosing import Hands
+from factory.floor.layout.hands.groups import LONG, PINNED, WAIT
+from factory.floor.layout.hands.hand import Hand
+from factory.floor.layout.hands.holding import held
+from factory.floor.layout.hands.kinds import ABOVE, BELOW
+from factory.floor.layout.hands.lowered import Lowered
+from factory.floor.layout.hands.one_hand import _cost
+from factory.floor.layout.hands.outermost import _on_edges
+from factory.floor.layout.hands.places import Loads, places
+from factory.floor.layout.hands.surfaces import hit
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import symmetric_shapes
 from factory.pipeline import all_templates
@@ -39,9 +50,12 @@ from tests.layout_values import (
     random_layout,
     row_of_inserts,
     shortened,
+    table_pag,
     with_path,
+    with_visits,
 )
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper
+from tests.slow import slow_but
 
 
 def test_the_same_input_gives_the_same_layout() -> None:
@@ -128,7 +142,7 @@ def laid_out(seed: int) -> Layout:
     return random_layout(7 + seed, seed, shape, style, True)
 
 
-@pytest.mark.parametrize("number", range(8))
+@pytest.mark.parametrize("number", slow_but([0, 3], range(8)))
 def test_nothing_touches(number: int) -> None:
     """Two or three units, every robot with a speed and a gain of its own."""
     layout = laid_out(number)
@@ -156,7 +170,14 @@ def broken(layout: Layout, *words: str) -> Certificate:
     return found
 
 
-@pytest.mark.parametrize("drawn", DRAWN, ids=str)
+SMALL = [drawn for drawn in DRAWN if drawn[0] <= 3]
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [*SMALL, *(pytest.param(d, marks=pytest.mark.slow) for d in DRAWN if d not in SMALL)],
+    ids=str,
+)
 def test_every_layout_is_clear(drawn: Drawn) -> None:
     layout = random_layout(*drawn)
     assert layout.certificate is not None and layout.certificate.holds
@@ -208,6 +229,21 @@ def test_an_insertion_with_a_wrong_standoff(monkeypatch: pytest.MonkeyPatch) -> 
     broken(layout, "it could never start")
 
 
+def test_a_station_moved_onto_its_neighbour() -> None:
+    layout = row_of_inserts()
+    factory = layout.factory
+    inserts = [o for o in factory.operations if o.template.name == "insert"]
+    later, sooner = inserts[0], inserts[2]
+    station = layout.guidepaths[sooner.carrier].length - layout.station(sooner.index)
+    moved = with_visits(layout, {later.index: station})
+    broken(moved, "away from the junction", later.label)
+    guest = later.robots[1]
+    on = layout.guidepaths[later.carrier]
+    both = with_path(moved, guest, a=on.middle(on.length - station))
+    neighbour = factory.robots[sooner.robots[1]].name
+    broken(both, factory.robots[guest].name, neighbour, "cross")
+
+
 def test_guidepaths_that_cross_or_leave_the_grid() -> None:
     layout = paper_layout()
     x, y = layout.guidepaths[5].a
@@ -235,3 +271,47 @@ def test_a_corridor_beside_a_robot_is_left_only_if_it_is_asked_for() -> None:
     (shape, *_), c = symmetric_shapes(layout.factory, layout.payloads, Clearance()), Clearance()
     made = [footprint(layout.factory, 0, shape, c, *asked) for asked in ((), (False,), (True,))]
     assert [one.corridor for one in made] == [False, False, True]
+
+
+def test_a_pin_and_a_wait_cost_and_a_wait_no_more_than_a_long_one() -> None:
+    hand = Hand(BELOW, ((0.0, 0.0, 0.0),))
+    waits = replace(hand, wait=0.1 * LONG / WAIT)
+    late = replace(hand, wait=9.0 * LONG / WAIT)
+    assert _cost(hand) == 0.0
+    assert _cost(replace(waits, tip="pin")) == pytest.approx(PINNED + 0.1 * LONG)
+    assert _cost(late) == LONG
+
+
+def test_an_upright_edge_is_within_a_disc_where_its_foot_is() -> None:
+    """And one that rises reaches as far out as where it leaves the disc."""
+    ends = np.array([[[0.05, 0.0], [0.05, 0.0]], [[0.0, 0.0], [0.1, 0.0]]])
+    out, at = np.array([[0.0, 0.3], [0.0, 0.2]]), np.array([[0.0, 0.0], [0.05, 0.0], [0.0, 0.9]])
+    reach = _on_edges(ends, out, at, np.full(3, 0.01))
+    assert reach == pytest.approx([0.02, 0.3, -np.inf])
+
+
+def test_how_thick_a_plate_is_does_not_matter_to_places_on_it() -> None:
+    made = []
+    for thick in (0.005, 0.1):
+        values = {"box": (0.1, 0.06, thick), "density": 5.0 / thick}
+        product = product_geometry(table_pag("x", ("x", "atomic", "", values)))
+        made.append(places(product, ("x",), (2, 1), ABOVE, Loads.of(product, (("x",),), 0.0)))
+    thin, thick = made
+    assert len(thin) and (thin.at[:, :2] == thick.at[:, :2]).all()
+
+
+def test_what_is_lowered_onto_a_place_is_in_the_way_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = paper_layout()
+    looked = Hands(layout.factory, layout.product).in_the_way
+    frames = [((1, 0), (0, 1))]
+    robot = next(r.index for r in layout.factory.robots if r.travels and r.index)
+    label = held(layout.factory, robot)
+    at = looked.on_side(robot, ABOVE, frames)
+
+    def met(*ways: Any) -> Any:
+        return np.arange(ways[0]) == 0 if len(ways) == 1 else hit(*ways)
+
+    monkeypatch.setattr(Lowered, "beams", lambda _, robot, kind, at, u, t: [(len(at),)])
+    monkeypatch.setattr(in_the_way, "hit", met)
+    free, _ = looked.checks(robot, label, ABOVE, at, frames)
+    assert free["lowered"].tolist() == [False, *[True] * (len(at) - 1)]

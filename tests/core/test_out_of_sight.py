@@ -103,9 +103,6 @@ class Eye(Closing):
         self._drawing.free()
         self._held.free()
 
-    def geom(self, name: str) -> int:
-        return int(self.replica.m.geom(name).id)
-
     def sees(self, jump: Jump) -> Iterator[int]:
         """How many pixels of each picture a jump changes."""
         for camera in cameras(self.layout, jump.in_sight):
@@ -130,22 +127,6 @@ class Eye(Closing):
 
 def model_of(layout: Layout, units: int) -> mujoco.MjModel:
     return Simulation(layout, RunRequest(units=units)).physical.m
-
-
-@pytest.fixture(scope="module")
-def paper() -> Layout:
-    return without_hands("paper")
-
-
-@pytest.fixture(scope="module")
-def found(paper: Layout) -> list[Jump]:
-    return list(jumps(paper, 2))
-
-
-@pytest.fixture
-def eye(paper: Layout) -> Iterator[Eye]:
-    with Eye(paper, model_of(paper, 2)) as eye:
-        yield eye
 
 
 @needs_gl

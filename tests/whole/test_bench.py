@@ -1,9 +1,13 @@
-"""The report on the benchmarks is what its kept results say."""
+"""The report on the benchmarks is what its kept results say. The list of mutants, and what kills
+them."""
 
 from __future__ import annotations
 
+import ast
 import json
 import sys
+import tomllib
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,12 +17,14 @@ import pytest
 from benches import reporting
 from benches.compare import manuals
 from benches.compare.__main__ import REPORT as COMPARISON
-from benches.covering import chosen, listed
+from benches.covering import chosen, killers, listed
 from benches.faults.__main__ import REPORT as FAULTS
 from benches.fidelity import long_runs
+from benches.mutants import LIST, wanted_of
 from benches.reporting import Report
 from benches.speed import processes
 from benches.speed.__main__ import REPORT
+from tests.paths import ROOT
 
 KEPT = [
     (report, file)
@@ -146,3 +152,28 @@ def test_memory_that_grows_is_noticed() -> None:
 def test_hundreds_of_units_do_not_drift() -> None:
     for run in long_runs.measure()["runs"]:
         assert long_runs.faults(run) == [], run
+
+
+def gone(tests: Iterable[str]) -> set[str]:
+    """Those of some tests whose functions are not there."""
+    names = {name.split("[")[0] for name in tests}
+    files = {name.split("::")[0] for name in names}
+    there = {
+        f"{file}::{node.name}"
+        for file in files
+        for node in ast.parse((ROOT / file).read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    return names - there
+
+
+def test_what_killed_a_mutant_is_there() -> None:
+    missing = gone(name for name in killers() if "::" in name)
+    assert not missing, "run `python -m benches.mutants run ROOM --write now`"
+
+
+def test_a_mutant_that_changes_nothing_is_not_run() -> None:
+    mutants = tomllib.loads(LIST.read_text(encoding="utf-8"))["mutant"]
+    equivalent = [one for one in mutants if "equivalent" in one]
+    assert all(one["equivalent"] and not one["now"] for one in equivalent)
+    assert wanted_of(equivalent, []) == [] and wanted_of(mutants, ["factory/floor/mating"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -21,10 +22,11 @@ from tests.examples import with_hands
 from tests.export_values import kept_log
 from tests.good_runs import assert_good
 from tests.paths import ROOT, files_in
+from tests.slow import slow_but
 
-TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
+TEMPLATES = sorted(path.stem for path in (ROOT / "templates").glob("*.op"))
 ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))
-EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
+EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
 
 
 def smallest_product(template: Template) -> str:
@@ -44,12 +46,17 @@ def smallest_product(template: Template) -> str:
     return f"root = t; t = weld ( s, dwell = 0.1 ); {operation}; " + "; ".join(made)
 
 
-@pytest.mark.parametrize("world", ["ideal", "mujoco"])
-@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
-def test_templates_run(file: Path, world: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "world"),
+    slow_but(
+        [("pick", "mujoco"), *product(TEMPLATES, ["ideal"])],
+        product(TEMPLATES, ["ideal", "mujoco"]),
+    ),
+)
+def test_templates_run(name: str, world: str) -> None:
     templates = all_templates()
-    plan = factory.compile(read_pag(smallest_product(templates[file.stem]), templates))
-    assert file.stem in {operation.template.name for operation in plan.operations}
+    plan = factory.compile(read_pag(smallest_product(templates[name]), templates))
+    assert name in {operation.template.name for operation in plan.operations}
     assert factory.verify(plan).holds
     run = factory.run(factory.lay_out(plan), world=world, units=1)
     assert run.products == 1
@@ -92,7 +99,11 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return kept_log(with_hands("paper"), tmp_path_factory.mktemp("log") / "run.log")
 
 
-@pytest.mark.parametrize("form", [e.format for e in exporters().values() if e.takes != "cell"])
+FORMATS = [e.format for e in exporters().values() if e.takes != "cell"]
+LARGE = ("gltf-factory", "gltf", "urdf", "stl", "dxf")
+
+
+@pytest.mark.parametrize("form", slow_but({*FORMATS} - {*LARGE}, FORMATS))
 def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> None:
     if form == "usd":
         pytest.importorskip("pxr", reason="the extra `usd` is not installed")
@@ -108,9 +119,9 @@ def test_exporters_run(run: Terminal, form: str, tmp_path: Path, log: Path) -> N
     assert one == other
 
 
-@pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)
-def test_examples_check(run: Terminal, file: Path) -> None:
-    done = run("check", file, "--json")
+@pytest.mark.parametrize("name", slow_but(["lamp"], EXAMPLES))
+def test_examples_check(run: Terminal, name: str) -> None:
+    done = run("check", ROOT / "examples" / f"{name}.pag", "--json")
     assert done.status == 0
     document = done.json
     n, robots = document["transitions"] // 2 - 1, document["robots"]

@@ -16,6 +16,7 @@ from factory.support.explanations import codes, explain
 from tests.command_line import Terminal
 from tests.house import this_house
 from tests.paths import files_in
+from tests.slow import slow_but
 
 CODE = re.compile(r"[A-Z][A-Za-z]+")
 
@@ -124,17 +125,13 @@ def example(code: str, folder: Path) -> list[str]:
     return re.findall(r"^ {4}\$ factory (.*)$", text, re.M)
 
 
-DEAR = ("Unreachable",)
-"""Codes whose examples take long; `test_sides.py` has a quicker one."""
+DEAR = ("Unreachable", "ArmLoad", "Failed", "NoCell", "NoGrip", "Timeout")
+"""Codes whose examples lay cells out, or run; tests of what they are about provoke them sooner."""
 
 
 @pytest.mark.parametrize(
     "code",
-    [
-        pytest.param(code, marks=pytest.mark.slow if code in DEAR else ())
-        for code in codes()
-        if code not in NOT_PROVOKED
-    ],
+    slow_but({*codes()} - {*DEAR}, [code for code in codes() if code not in NOT_PROVOKED]),
 )
 def test_the_example_provokes_the_code(
     code: str, run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

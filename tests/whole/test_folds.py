@@ -49,6 +49,7 @@ from tests.fold_values import (
 )
 from tests.net_values import legal_markings, net_from
 from tests.pag_values import catalogue, paper, random_pag
+from tests.slow import slow_but
 from tests.state_space import explored
 
 Json = dict[str, Any]
@@ -86,9 +87,7 @@ def folds_are_live(seeds: range, size: int) -> tuple[int, int]:
     return shared, small
 
 
-@pytest.mark.parametrize(
-    "block", [*range(3), *(pytest.param(n, marks=pytest.mark.slow) for n in range(3, 10))]
-)
+@pytest.mark.parametrize("block", slow_but([0], range(10)))
 def test_a_thousand_random_folds_are_live_safe_and_reversible(block: int) -> None:
     shared, small = folds_are_live(range(100 * block, 100 * block + 100), 30)
     assert shared > 30 and small > 10

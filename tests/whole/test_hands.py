@@ -25,6 +25,7 @@ from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, read
 from tests.layout_values import with_visits
 from tests.paths import EXAMPLES, ROOT
+from tests.slow import slow_but
 
 AT_MOST_MM = 0.1
 """Nothing that is drawn is deeper in anything."""
@@ -49,15 +50,7 @@ def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetra
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "paper",
-        "lamp",
-        "stool",
-        pytest.param("truck", marks=pytest.mark.slow),
-        pytest.param("chair", marks=pytest.mark.slow),
-        pytest.param("balanced", marks=pytest.mark.slow),
-    ],
+    "name", slow_but(["paper"], ["paper", "lamp", "stool", "truck", "chair", "balanced"])
 )
 def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     simulation, hidden = looked_at(with_hands(name))
@@ -68,6 +61,7 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     assert hidden.deepest() < AT_MOST_MM
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [-2e-3, 2e-3])
 def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
     """Each hand of the paper's example in turn: away from what it holds, and into it."""

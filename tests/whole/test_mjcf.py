@@ -1,5 +1,6 @@
 """The MJCF that is written: readable, relocatable, repeatable, and true to the layout and the
-geometry."""
+geometry. The timestep that the factory chooses: the longest that its drives allow, and no longer. A
+build is left out if and only if nothing has changed since the one before."""
 
 from __future__ import annotations
 
@@ -16,6 +17,8 @@ import trimesh
 import factory
 from factory.apps.exports.binary import beside
 from factory.apps.exports.stock import model_files, written
+from factory.apps.fidelity.record import QUANTITIES
+from factory.engine.mjcf.driving import ALLOWED
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import Model
 from factory.engine.simulation.modelling import physical_model
@@ -23,7 +26,7 @@ from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError
 from factory.support.extensions import extensions
 from factory.support.files import write_all
-from factory.support.settings import Settings
+from factory.support.settings import AUTO, Settings
 from tests.command_line import Terminal
 from tests.examples import without_hands
 from tests.paths import PAPER, ROOT, files_in
@@ -157,3 +160,53 @@ def test_no_binary_lies_beside_a_device_or_upon_the_mjcf(tmp_path: Path) -> None
     assert beside(tmp_path) is None
     assert beside(tmp_path / "m.xml") == tmp_path / "m.mjb"
     assert beside(tmp_path / "m.mjb") == tmp_path / "m.mjb.mjb"
+
+
+LIMITS = ("tracking_error_max_mm", "handoff_gap_max_mm", "weld_residual_max_mm")
+"""The figures that a timestep is chosen by."""
+
+
+def test_it_is_half_of_what_a_good_factory_keeps() -> None:
+    assert {QUANTITIES[key].limit for key in LIMITS} == {2e3 * ALLOWED}
+
+
+def test_what_is_no_timestep_is_told(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "'soon' is not a valid float" in run("run", PAPER, "--timestep", "soon").err
+    monkeypatch.setenv("FACTORY_TIMESTEP", "soon")
+    told = run("run", PAPER)
+    assert told.status == 2
+    assert "FACTORY_TIMESTEP: timestep must be a number" in told.err
+    assert 'for example timestep = 0.002, or "auto"' in told.err
+    with pytest.raises(InputError, match="speed"):
+        Settings().with_options({"speed": 1e9, "timestep": AUTO})
+    with pytest.raises(ValueError, match="auto"):
+        _ = Settings().step
+
+
+MESHED = """root = a;
+a = mate(b, c);
+b = atomic(mesh = "wing.stl", pos = (0, 0, 0.05));
+c = atomic(box = (0.1, 0.1, 0.05), pos = (0, 0, 0.2))
+"""
+
+
+@pytest.fixture
+def product(tmp_path: Path) -> Path:
+    """A product with a mesh of its own."""
+    import trimesh
+
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "wing.stl")
+    (tmp_path / "p.pag").write_text(MESHED)
+    return tmp_path / "p.pag"
+
+
+def test_another_factory_toml_is_another_build(run: Terminal, product: Path) -> None:
+    """Whatever it says: branches, lines, arms."""
+    mjcf = product.parent / "m.xml"
+    lines(run, product, "--mjcf", mjcf)
+    (product.parent / "factory.toml").write_text("[parallel]\nb = 2\n")
+    assert not again(lines(run, product, "--mjcf", mjcf))
+    (product.parent / "factory.toml").unlink()
+    assert not again(lines(run, product, "--mjcf", mjcf))

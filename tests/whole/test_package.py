@@ -1,27 +1,40 @@
 """The Python package: its functions do what the commands do, its values are checked and show
-themselves, its types reach a user's script, and the clash of its import name is said."""
+themselves, its types reach a user's script, and the clash of its import name is said. What is a
+table is one for pandas, too: the same rows, figures by their names in `--json`. A project is a PAG
+with all that follows from it; options travel as values with types. Products of our own with true
+clearances: a chest of drawers, of which everything slides, and a gearbox, which needs the lift.
+Nothing of them touches, on the way or when finished, in the engine's own eyes."""
 
 from __future__ import annotations
 
 import ast
 import json
+import math
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 import factory
+from factory.apps.drawing.tables import Tabular
+from factory.commands.requests import ProjectOptions
+from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support import namesake
+from factory.support.errors import InputError
+from factory.support.settings import Settings
+from factory.theory.problem.plan import Plan
 from tests.apps.planning.test_plan_models import PEG
 from tests.command_line import Terminal
 from tests.opengl import needs_gl
-from tests.paths import PAPER, ROOT
+from tests.paths import PAPER, ROOT, files_in
 from tests.plan_puzzles import pinwheel, source
 
 WRONG: tuple[tuple[Callable[[Any], object], tuple[object, ...]], ...] = (
@@ -101,7 +114,9 @@ def test_every_stage_gives_the_same_run() -> None:
     plan = factory.compile(pag)
     layout = factory.lay_out(plan)
     stages = (str(PAPER), PAPER, pag, plan, layout, read(PAPER))
-    runs = [factory.run(stage, units=2, seed=3, jitter=0.2).events for stage in stages]
+    runs = [
+        factory.run(stage, world="ideal", units=2, seed=3, jitter=0.2).events for stage in stages
+    ]
     assert all(run == runs[0] for run in runs)
 
 
@@ -115,8 +130,8 @@ def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
             tmp_path / "function" / name
         ).read_bytes()
         assert same, name
-    again = factory.run(tmp_path / "function" / "plan.json", units=2)
-    assert again.events == factory.run(PAPER, units=2).events
+    again = factory.run(tmp_path / "function" / "plan.json", world="ideal", units=2)
+    assert again.events == factory.run(PAPER, world="ideal", units=2).events
 
 
 def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
@@ -208,6 +223,7 @@ def cells() -> list[str]:
 
 
 @needs_gl
+@pytest.mark.slow
 def test_the_notebook_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT / "docs")
     names: dict[str, Any] = {}
@@ -313,3 +329,139 @@ def test_nothing_is_said_without_factory_boy(
     assert not namesake.clash()
     monkeypatch.setattr("factory.support.namesake.release", lambda name: "3.3.3")
     assert "factory_boy 3.3.3, which has the same import name" in run("doctor").out
+
+
+def swept(folder: Path) -> Tabular:
+    values = {"seed": [0, 1], "speed": [0.2, 0.3]}
+    return factory.sweep(PAPER, folder / "a.db", values, world="ideal", units=4, jobs=1)
+
+
+TABLES: dict[str, tuple[Callable[[Path], Tabular], int, set[str]]] = {
+    "sweep": (swept, 2, {"speed", "done", "failed", "cycle_time_s", "cycle_time_s_deviation"}),
+    "analyze": (lambda _: factory.analyze(PAPER), 6, {"robot", "busy", "gain_second_robot_s"}),
+    "pareto": (
+        lambda _: factory.pareto(PAPER, layouts=False),
+        3,
+        {"robots", "tools", "estimated_cycle_time_s"},
+    ),
+    "fidelity": (
+        lambda _: factory.fidelity(PAPER, seeds=2, units=1, jobs=1),
+        2,
+        {"seed", "passed", "tracking_error_max_mm"},
+    ),
+}
+"""For each command its value, the number of rows at least, and some of the columns."""
+
+
+@pytest.fixture(scope="module", params=TABLES)
+def case(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Tabular, int, set[str]]:
+    make, rows, columns = TABLES[request.param]
+    return make(tmp_path_factory.mktemp("frames")), rows, columns
+
+
+def test_records_are_plain_rows(case: tuple[Tabular, int, set[str]]) -> None:
+    value, rows, columns = case
+    records = value.records()
+    assert len(records) >= rows
+    for record in records:
+        assert columns <= record.keys() == records[0].keys()
+        assert all(v is None or isinstance(v, str | int | float) for v in record.values())
+
+
+def test_a_frame_has_the_records(case: tuple[Tabular, int, set[str]]) -> None:
+    pandas = pytest.importorskip("pandas", reason="the extra `pandas` is not installed")
+    value, *_ = case
+    frame, records = value.to_frame(), value.records()
+    assert isinstance(frame, pandas.DataFrame)
+    assert [*frame.columns] == [*records[0]]
+    for row, record in zip(frame.to_dict("records"), records, strict=True):
+        for name, figure in record.items():
+            same = row[name] == figure
+            assert same or (figure is None and (row[name] is None or math.isnan(row[name])))
+
+
+def test_pandas_gets_the_records(
+    case: tuple[Tabular, int, set[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where pandas is not installed, a stand-in takes them."""
+    value, *_ = case
+    pandas: Any = ModuleType("pandas")
+    pandas.DataFrame = type("DataFrame", (), {"from_records": staticmethod(lambda rows: rows)})
+    monkeypatch.setitem(sys.modules, "pandas", pandas)
+    assert value.to_frame() == value.records()
+
+
+def test_without_pandas_the_extra_is_named(
+    case: tuple[Tabular, int, set[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    value, *_ = case
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(factory.MissingError) as caught:
+        value.to_frame()
+    (diagnostic,) = caught.value.diagnostics
+    assert caught.value.exit_status == 3 and diagnostic.code == "Missing"
+    assert diagnostic.message.startswith("a data frame needs pandas")
+    assert diagnostic.hint == "pip install 'klavins-factory[pandas]'"
+
+
+UNFIT = ((PAPER, "--fuse", "--world", "ideal"),)
+"""Files and options that do not go together."""
+
+
+@pytest.mark.parametrize("words", UNFIT, ids=lambda words: " ".join(map(str, words[1:])))
+def test_options_that_do_not_go_together_are_refused_before_any_work(
+    words: tuple[object, ...], run: Terminal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work(*_: object) -> None:
+        raise AssertionError("something was compiled")
+
+    monkeypatch.setattr("factory.pipeline.compile_pag", work)
+    done = run("run", *words, "--json")
+    assert done.status == 2 and done.codes[0] in ("BadValue", "BadDemand", "Usage")
+
+
+def test_no_plan_with_several_tours_gets_relays() -> None:
+    project = read(PAPER).with_plan(Plan(turns=((0, 1, 2, 3, 4, 4),)))
+    with pytest.raises(InputError, match="several tours"):
+        project.with_ground(Ground(relay=True))
+    with pytest.raises(InputError, match="several tours"):
+        read(PAPER, ground=Ground(relay=True)).with_plan(project.plan)
+
+
+def test_options_become_settings_and_ground() -> None:
+    given = ProjectOptions(PAPER, speed=0.2, stage=True, floor="4x3", cycle=2.0)
+    assert given.settings() == Settings(speed=0.2, stage=1)
+    assert given.ground() == Ground((4.0, 3.0), False, 2.0)
+    with pytest.raises(InputError, match="--floor takes two positive numbers"):
+        replace(given, floor="4").ground()
+
+
+def loose(text: str) -> Iterator[str]:
+    """Parameters of functions that are dictionaries of anything."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.arg) and node.annotation is not None:
+            words = ast.unparse(node.annotation)
+            if words.startswith(("dict[str, Any]", "Mapping[str, Any]")):
+                yield node.arg
+
+
+def test_no_command_passes_a_dictionary_of_options() -> None:
+    planted = "from typing import Any\ndef run(options: dict[str, Any]) -> None: ..."
+    assert list(loose(planted)) == ["options"]
+    for path in (ROOT / "factory" / "commands").glob("*.py"):
+        assert not list(loose(path.read_text("utf-8"))), path.name
+
+
+EXAMPLES = ROOT / "examples"
+OWN = ["chest", "gearbox"]
+
+
+def test_the_generator_writes_the_same_bytes(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, EXAMPLES / "make_meshes.py", tmp_path], check=True)
+    made = files_in(tmp_path)
+    kept = {f"{name}/{k}" for name in [*OWN, "peg"] for k in files_in(EXAMPLES / name)}
+    assert len(made) == len(kept) > 0
+    for path in tmp_path.rglob("*.obj"):
+        assert path.read_bytes() == (EXAMPLES / path.relative_to(tmp_path)).read_bytes(), path.name

@@ -26,6 +26,7 @@ from factory.theory.problem.plan import Plan
 from tests.apps.relay.test_relay_hands import sawn
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT, TESTS
+from tests.slow import slow_but
 
 EXAMPLES = ROOT / "examples"
 COMPARED = ("factory", "guidepaths", "visits", "hands", "floor", "outfeed")
@@ -112,7 +113,7 @@ def built(run: Terminal, tmp_path: Path) -> Path:
     return tmp_path / "d"
 
 
-@pytest.mark.parametrize("name", VARIANTS)
+@pytest.mark.parametrize("name", slow_but(["written", "lines"], VARIANTS))
 def test_a_plan_is_read_in_place_of_its_pag(name: str, tmp_path: Path) -> None:
     """To the last bit: the same plan, layout, model and prediction, with its layout and without."""
     project, folder = VARIANTS[name](tmp_path), tmp_path / "here" / "d"

@@ -21,6 +21,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.presence import Presence
 from factory.pipeline import read
+from tests.slow import slow_but
 from tests.whole import test_tees
 
 OFF = SPARE
@@ -159,7 +160,9 @@ def played(
     return game.faults + [f"{name} is not made" for name in game.unmade]
 
 
-@pytest.mark.parametrize(("name", "distributed"), [("paper", True), ("stool", False)])
+@pytest.mark.parametrize(
+    ("name", "distributed"), slow_but([("paper", True)], [("paper", True), ("stool", False)])
+)
 def test_examples(name: str, distributed: bool) -> None:
     assert not played(read(f"examples/{name}.pag").layout, 1, distributed=distributed)
 

@@ -36,6 +36,7 @@ from tests.good_runs import random_marking
 from tests.layout_values import random_layout
 from tests.pag_values import SHAPES
 from tests.simulation_values import FINE, layout_of, ready, stepping
+from tests.slow import slow_but
 
 LONG = 12.0
 """The simulated time [s] after which a trace ends."""
@@ -219,13 +220,7 @@ def blamed(case: Case, plain: Trace, switches: Sequence[str]) -> dict[str, str]:
     return {name: trace(case, [name]).differs(plain) for name in switches}
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [
-        pytest.param(n, marks=() if n in (0, 1, 3, 4, 5, 6, 8) else pytest.mark.slow)
-        for n in range(60)
-    ],
-)
+@pytest.mark.parametrize("seed", slow_but([0, 4], range(60)))
 def test_a_trace_is_the_same_however_it_is_run(seed: int, tmp_path: Path) -> None:
     """At full speed; and step by step with a log, a monitor and measurements beside it."""
     case = drawn(seed)
@@ -296,7 +291,9 @@ FAULTS: dict[str, tuple[str, Any, str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize(
+    "fault", slow_but(["a goal that comes unseen", "going back forgets setpoints"], FAULTS)
+)
 def test_a_planted_fault_makes_another_trace(fault: str) -> None:
     name, *what = FAULTS[fault]
     case = Case(layout_of(name), {"fast": True}, ())

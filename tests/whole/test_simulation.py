@@ -18,6 +18,7 @@ from tests.good_runs import random_marking
 from tests.layout_values import Drawn, random_layout
 from tests.pag_texts import PAPER, laid_out
 from tests.simulation_values import layout_of, ready
+from tests.slow import slow_but
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +37,7 @@ def test_robots_with_their_own_programs_have_any_speed_at_once_in_the_ideal_worl
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.005)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", slow_but([0, 1], range(6)))
 def test_a_run_can_start_from_any_legal_marking(paper: Layout, seed: int) -> None:
     """Theorem 5.2: dropoff runs again and again, whatever the marking; in MuJoCo in
     `test_monitor`."""

@@ -30,6 +30,7 @@ from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.live_sessions import Stopped
 from tests.paths import ROOT
+from tests.slow import slow_but
 
 EXAMPLES = ROOT / "examples"
 
@@ -85,10 +86,9 @@ def test_the_rows_of_a_weld_are_the_load_on_its_holder() -> None:
     np.testing.assert_allclose(load, -exact[1:7], atol=1e-3 * np.abs(load).max())
 
 
-LARGE = [pytest.param(name, marks=pytest.mark.slow) for name in ("truck", "chair", "gearbox")]
-
-
-@pytest.mark.parametrize("name", ["paper", "lamp", "stool", *LARGE])
+@pytest.mark.parametrize(
+    "name", slow_but(["paper"], ["paper", "lamp", "stool", "truck", "chair", "gearbox"])
+)
 def test_hands_bear_what_was_predicted(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Less where a load is pushed only to some sides; hands are strong enough."""
     simulation, most = ready(name, units=3), dict[int, float]()

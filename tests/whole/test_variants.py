@@ -12,6 +12,7 @@ import pytest
 from tests.apps.relay.test_relay_hands import sawn
 from tests.command_line import Terminal
 from tests.paths import PAPER
+from tests.slow import slow_but
 
 SLOW = """root = c; c = insert(p, b); b = weld(a, dwell = 6); a = insert(q, r);
 p = atomic(); q = atomic(); r = atomic()"""
@@ -29,7 +30,7 @@ OF_RUNS = {"staged": ("--stage",), "little inside": ("--wip", "1")}
 """Options that make no other factory, but other runs of it."""
 
 
-@pytest.mark.parametrize("name", [*VARIANTS, *OF_RUNS])
+@pytest.mark.parametrize("name", slow_but(["branches"], [*VARIANTS, *OF_RUNS]))
 def test_all_commands_make_the_same_factory(
     name: str, run: Terminal, out: Path, here: None
 ) -> None:

@@ -29,6 +29,7 @@ from tests.command_line import Terminal
 from tests.examples import with_hands
 from tests.paths import PAPER, ROOT
 from tests.planted import before_the_switch, into, moved, warns
+from tests.slow import slow_but
 
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
 
@@ -51,9 +52,9 @@ def failed(run: Terminal, *more: object) -> set[str]:
     return {failure["code"] for failure in verdict["failures"]}
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
+@pytest.mark.parametrize("name", slow_but(["paper"], EXAMPLES))
 @pytest.mark.parametrize(
-    ("seed", "fuse"), [*(pytest.param(n, False, marks=pytest.mark.slow) for n in (0, 1)), (1, True)]
+    ("seed", "fuse"), slow_but([(1, True)], [(0, False), (1, False), (1, True)])
 )
 def test_an_honest_run_of_an_example_succeeds(name: str, seed: int, fuse: bool) -> None:
     layout = with_hands(name)
@@ -135,7 +136,7 @@ def test_two_events_exchanged_in_a_log(log_file: Path) -> None:
         if other < len(log.fired) and log.fired[one] != log.fired[other]
         if abs(log.fired_t[one] - log.fired_t[other]) > 1e-6
     ]
-    for one, other in pairs[::5]:
+    for one, other in pairs[::15]:
         fired = log.fired.copy()
         fired[[one, other]] = fired[[other, one]]
         changed = replace(log, fired=fired)

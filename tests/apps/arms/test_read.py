@@ -13,7 +13,6 @@ from factory.api import InputError
 from factory.apps.arms.body import Stand, standing
 from factory.apps.arms.certifying import uncertified
 from factory.apps.arms.model import KINDS, ArmModel
-from factory.apps.arms.reach import ring_of
 from factory.apps.arms.read import MODELS, chain_of, read_chain
 from tests.arm_models import random_way, shipped
 
@@ -270,20 +269,6 @@ def test_an_arm_that_is_not_there_is_refused(tmp_path: Path) -> None:
             ArmModel.of(asked)
         (why,) = error.value.diagnostics
         assert why.code == "Usage" and all(kind in why.hint for kind in KINDS)
-
-
-def test_a_ring_is_where_the_tool_comes_to_all_heights() -> None:
-    """The SCARA has to stand higher, and comes to no heights farther apart than its slide."""
-    six, scara = shipped("six"), shipped("scara")
-    ring = ring_of(six, 0.1, 0.3)
-    assert ring is not None and ring.base == 0.10
-    assert 0.1 < ring.inner < ring.at(0.41) < ring.outer < 1.0
-    broad = ring_of(six, 0.1, 0.3, 0.1)
-    assert broad is not None and broad.at(0.0) == broad.inner + 0.1
-    assert broad.at(1.0) == broad.outer - 0.1
-    low = ring_of(scara, 0.02, 0.15)
-    assert low is None or low.base > 0.1 or low.outer < 0.6
-    assert ring_of(scara, 0.1, 0.1 + 0.3) is None
 
 
 def test_a_way_is_certified_only_if_nothing_between_samples_is_near() -> None:

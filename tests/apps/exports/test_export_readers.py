@@ -39,6 +39,7 @@ from tests.export_values import (
 from tests.export_values import write as written
 from tests.good_runs import assert_good
 from tests.paths import PAPER, ROOT
+from tests.slow import slow_but
 from tests.structured_text import Plc
 
 DOCUMENT = ROOT / "docs" / "exports.md"
@@ -602,7 +603,11 @@ def usd_by_usd_core(log: Path) -> None:
             assert np.allclose(place, d.geom_xpos[geom], atol=1e-5)
 
 
-@pytest.mark.parametrize("which", READERS)
+LONG = {"st-an interpreter of the tests", "gltf-factory-pygltflib"}
+"""What `test_plc.py` and another reader of the format find as soon."""
+
+
+@pytest.mark.parametrize("which", slow_but(READERS.keys() - LONG, READERS))
 def test_read_back(which: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     reader = READERS[which]
     takes_log = exporters()[reader.form].takes in ("log", "factory")

@@ -1,7 +1,6 @@
-"""Regression: the figures of some products against what is kept in tests/baselines.
-
-`make golden`, or pytest --update-golden, renews them: review the diff.
-"""
+"""Regression: the figures of some products against what is kept in tests/baselines. `make golden`,
+or pytest --update-golden, renews them: review the diff. Every figure of fidelity against known
+values, and against planted faults."""
 
 from __future__ import annotations
 
@@ -15,15 +14,16 @@ from pathlib import Path
 import pytest
 
 import factory
-from factory.apps.fidelity import QUANTITIES, measure_seed
+from factory.apps.fidelity import QUANTITIES, SeedRecord, measure_seed
 from factory.apps.fidelity.comparing import Alter, Case
 from factory.apps.fidelity.hidden import HiddenPenetrations
-from factory.apps.fidelity.record import Figures
+from factory.apps.fidelity.record import Fidelity, Figures
 from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import Terminal
 from tests.paths import PAPER, TESTS
+from tests.slow import slow_but
 
 FOLDER = TESTS / "baselines"
 EXAMPLES = FOLDER.parent.parent / "examples"
@@ -102,10 +102,7 @@ def kept(name: str) -> Mapping[str, float | None]:
     return dict(json.loads(path.read_text("utf-8"))["figures"])
 
 
-LARGE = {"gearbox": pytest.param("gearbox", marks=pytest.mark.slow)}
-
-
-@pytest.mark.parametrize("name", [LARGE.get(name, name) for name in PRODUCTS])
+@pytest.mark.parametrize("name", slow_but(["paper", "unary"], PRODUCTS))
 def test_figures_stay_within_tolerance(name: str, request: pytest.FixtureRequest) -> None:
     found = {key: rounded(value) for key, value in figures(name).items()}
     if request.config.getoption("--update-golden"):
@@ -180,8 +177,8 @@ FAULTS: dict[str, tuple[Alter, set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["paper", pytest.param("meshes", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.parametrize("name", slow_but(["paper"], ["paper", "meshes"]))
+@pytest.mark.parametrize("fault", slow_but(["a shifted site", "a wrong mass"], FAULTS))
 def test_a_planted_fault_is_caught(name: str, fault: str) -> None:
     alter, expected = FAULTS[fault]
     told = deviations(figures(name, alter), kept(name))
@@ -279,3 +276,11 @@ def test_the_deepest_of_all_times_and_copies_is_kept() -> None:
     assert (found.geoms, found.time_s) == (("part/b#1", "part/b#2"), 0.1)
     assert found.depth_mm == hidden.deepest() == pytest.approx(90, abs=0.01)
     assert str(found) == "90.000 mm: part/b#1 - part/b#2, at 0.10 s"
+
+
+@pytest.mark.parametrize(
+    ("units", "words"), [((4, 4), "2 seeds, 4 units"), ((9, 4, 61), "3 seeds, 4 to 61 units")]
+)
+def test_runs_are_counted_from_the_fewest_units_to_the_most(units, words: str) -> None:
+    seeds = tuple(SeedRecord(seed, count, {}) for seed, count in enumerate(units))
+    assert Fidelity("x", 3, 0.3, seeds).runs == words

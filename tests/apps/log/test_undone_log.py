@@ -18,7 +18,7 @@ from factory.support.errors import InputError
 from factory.theory.nets.replay import replay
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory
-from tests.apps.log.test_log_damage import put_together, taken_apart
+from tests.apps.log.test_log import put_together, taken_apart
 from tests.command_line import spawn
 from tests.paths import PAPER
 

@@ -1,4 +1,5 @@
-"""The theorems of the planner: what interlocks, what is best, and what `check` says of it."""
+"""The theorems of the planner: what interlocks, what is best, and what `check` says of it. The
+exploded view of a planned product, as a still and as a film."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
@@ -24,6 +26,7 @@ from factory.apps.planning.exact import Best, Expected, Tree, TreeTask
 from factory.apps.planning.growing import Divider, bettered, divided, units_of
 from factory.apps.planning.judging import Judged, Site
 from factory.apps.planning.laying import LaidOut
+from factory.apps.planning.loose_parts import loose_parts
 from factory.apps.planning.searching import GROWING, Sought, budget_of, trees
 from factory.apps.planning.subsets import Stance, stances, subsets
 from factory.floor.geometry.decimation import ENOUGH, decimated
@@ -186,3 +189,11 @@ def test_a_tree_without_a_layout_takes_for_ever_on_an_endless_floor() -> None:
 
     tree: Any = LaidOut(None, (), Unlaid(), 1)  # type: ignore[arg-type]
     assert tree.seconds == np.inf == tree.area
+
+
+def test_a_light_stands_as_far_off_as_the_product_is_large() -> None:
+    box = trimesh.creation.box((0.1, 0.1, 0.1))
+    surfaces = {"a": (np.array(box.vertices), np.array(box.faces))}
+    for size in (0.1, 2.0):
+        m = loose_parts(surfaces, [(1.0, 0.0, 0.0, 1.0)], 0.0, size)
+        assert m.light_pos == pytest.approx(-3.0 * size * m.light_dir, rel=0.01)

@@ -120,7 +120,8 @@ def ran(simulation: Simulation, max_time: float = 60.0) -> Run:
     return watched(simulation, every_tick=True, max_time=max_time)
 
 
-@pytest.mark.parametrize("scan", [pytest.param(4, marks=pytest.mark.slow), 20])
+@pytest.mark.slow
+@pytest.mark.parametrize("scan", [4, 20])
 def test_three_products_through_a_socket(scan: int) -> None:
     simulation, served = plant()
     plc = Plc(text("paper", scan))
@@ -134,6 +135,7 @@ def test_three_products_through_a_socket(scan: int) -> None:
     assert made.physics.handoff_gap_max_mm <= 0.1
 
 
+@pytest.mark.slow
 def test_what_may_not_be_is_refused_by_name() -> None:
     """A driver of its own kind takes a part over from afar."""
     simulation, served = plant(units=1, pace=10.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from tests.examples import with_hands
 from tests.good_runs import assert_good
 from tests.paths import PAPER, ROOT
 from tests.simulation_values import layout_of
+from tests.slow import slow_but
 
 WORLDS = "mujoco", "ideal"
 UNITS = 3
@@ -88,8 +90,10 @@ EACH: dict[str, tuple[Deviation, str, str]] = {
 that dies on its way is to go back first."""
 
 
-@pytest.mark.parametrize("world", WORLDS)
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize(
+    ("name", "world"),
+    slow_but([("drop", "mujoco"), *product(EACH, ["ideal"])], product(EACH, WORLDS)),
+)
 def test_each_kind_of_fault(name: str, world: str) -> None:
     fault, test, response = EACH[name]
     spare = Campaign(spares=1, swap=2.0)
@@ -164,7 +168,7 @@ def test_what_no_test_looks_for_is_not_seen(world: Any) -> None:
         assert not run.succeeded
 
 
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("world", slow_but(["ideal"], WORLDS))
 def test_a_dead_robot_without_a_spare(world: Any) -> None:
     """What can be finished without it is, and then the run says which it was."""
     dead = Deviation("dead", robot="r6", unit=3)
@@ -191,7 +195,7 @@ BLIND: dict[str, tuple[type, str, Any, str]] = {
 """A sense that is taken from the factory, and what is found in place of that; "" for nothing."""
 
 
-@pytest.mark.parametrize("name", BLIND)
+@pytest.mark.parametrize("name", slow_but(["askew"], BLIND))
 def test_blind_sensors_never_succeed_unnoticed(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each fault is missed, and counted as such, or the run stalls."""
     where, method, blind, instead = BLIND[name]
@@ -328,7 +332,7 @@ def test_a_robot_whose_lift_still_waits_has_left(steps: Layout) -> None:
     assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
 
 
-@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize("world", slow_but(["ideal"], WORLDS))
 @pytest.mark.parametrize(
     ("responses", "units", "made"),
     [

@@ -28,8 +28,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.claim import claimed, claimed_again
 from factory.support.errors import InputError
-from tests.apps.log.test_log import block_ends
-from tests.apps.log.test_log_damage import put_together, taken_apart
+from tests.apps.log.test_log import block_ends, put_together, taken_apart
 from tests.command_line import Terminal, spawn, started
 from tests.paths import PAPER, ROOT
 from tests.simulation_values import FINE, layout_of

@@ -8,8 +8,7 @@ from random import Random
 
 import pytest
 
-from tests.apps.log.test_log import block_ends
-from tests.apps.log.test_log_damage import put_together, taken_apart
+from tests.apps.log.test_log import block_ends, put_together, taken_apart
 from tests.apps.resume.test_resume import EXAMPLES, killed_and_gone_on, ticks_of
 from tests.command_line import Terminal, spawn
 from tests.paths import PAPER

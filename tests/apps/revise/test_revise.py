@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import random
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from benches.revisions import edited, kept_share, shuffled
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.revise.family import family
+from factory.apps.revise.inheriting import Inheritance
 from factory.apps.revise.matching import label_digests, matching, shifted
+from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.revision import Revision, revised
 from factory.floor.layout.certificate import Fault
+from factory.floor.layout.exclusions import coordinated
+from factory.floor.layout.layout import Layout
 from factory.pipeline import Project, all_templates
 from factory.support.errors import InputError
 from factory.theory.lang import read_pag, write_pag
@@ -21,7 +27,43 @@ from factory.theory.problem.pag import PAG, Mix, Parameter
 from factory.theory.problem.plan import Plan
 from tests.command_line import spawn
 from tests.paths import EXAMPLES
-from tests.revisions import edited, kept_share, refuted, shuffled
+
+
+def refuted(mine: Inheritance, old: Layout, new: Layout, pairing: Pairing) -> Iterator[str]:
+    """What is wrong with an inheritance: an entry that is not in the old certificate, is of other
+    machines, or whose circuit does not keep them apart in the new net. Uses nothing of how it was
+    found."""
+    assert old.certificate is not None and new.certificate is not None
+    if not old.certificate.holds:
+        yield "the old certificate does not hold"
+    before, after = old.certificate.apart.excluded, new.certificate.apart.excluded
+    net, words = coordinated(new).net, dict[str, str]()
+    for a, b in pairing.operations.items():
+        words[pairing.old.operations[a].label] = pairing.new.operations[b].label
+    for a, b in pairing.robots.items():
+        words[pairing.old.robots[a].name] = pairing.new.robots[b].name
+
+    def named(name: str) -> str:
+        parts = (" ".join(words.get(w, w) for w in part.split(" ")) for part in name.split(":"))
+        return ":".join(parts)
+
+    place = {one.name: n for n, one in enumerate(net.net.places)}
+    for number, other in mine.entries.items():
+        if not (0 <= number < len(after) and 0 <= other < len(before)):
+            yield f"entry {number}: there is no such entry"
+            continue
+        one, its = after[number], before[other]
+        name = f"entry {number}, of {' and '.join(one.machines)}"
+        sides = sorted(zip(map(named, its.machines), map(named, its.places), strict=True))
+        if sides != sorted(zip(one.machines, one.places, strict=True)):
+            yield f"{name}: it is of other machines, or places"
+        circuit = [place.get(named(each), -1) for each in its.circuit]
+        onward = (*circuit[1:], circuit[0])
+        follow = all(net.right[p] == net.left[q] for p, q in zip(circuit, onward, strict=True))
+        if -1 in circuit or not follow or sum(net.tokens[p] for p in circuit) != 1:
+            yield f"{name}: its circuit is none of the new net"
+    if mine.pairs != len(after):
+        yield "the pairs are miscounted"
 
 
 def example(name: str) -> PAG:
