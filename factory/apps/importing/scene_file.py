@@ -156,7 +156,6 @@ def read_one(path: Path, content: bytes) -> Bodies:
 def read_step(content: bytes) -> list[GlbBody]:
     """The components of a STEP file that have faces, in metres, with the colours that the file
     states. Raises UnreadableMesh, and MissingError without cascadio."""
-    optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
     if BEGIN not in content[:4096]:
         raise UnreadableMesh(f"it is not {EXPECTED['.step']}")
     with TemporaryDirectory() as folder:
@@ -200,7 +199,7 @@ def _deflection(body: GlbBody) -> float:
 
 def _triangles(source: Path, deflection: float) -> list[GlbBody]:
     """The components of a STEP file, at most so far from their faces [mm]. Raises
-    UnreadableMesh."""
+    UnreadableMesh, and MissingError without cascadio, which takes long to load."""
     made, none = source.with_suffix(".glb"), subprocess.DEVNULL
     made.unlink(missing_ok=True)
     words = [sys.executable, "-c", CONVERT, str(source), str(made), str(deflection)]
@@ -208,6 +207,7 @@ def _triangles(source: Path, deflection: float) -> list[GlbBody]:
         words, cwd=source.parent, stdin=none, stdout=none, stderr=none, check=False
     )
     if not made.exists():
+        optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
         ended = f"; it ended with status {done.returncode}" if done.returncode else ""
         why = f"OpenCASCADE finds no faces in it{ended}; it should be {EXPECTED['.step']}"
         raise UnreadableMesh(why)

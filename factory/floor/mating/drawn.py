@@ -24,6 +24,8 @@ from factory.floor.geometry.overlap import (
     bounded,
     common,
     drawn,
+    is_seen_near,
+    may_share,
     overlap_of,
     swept,
     united,
@@ -168,7 +170,12 @@ class DrawnWays:
         coarse, margin = [self._coarse(part) for part in (one, other)], self._margin(one, other)
         if margin and coarse[0].body.min_gap(coarse[1].body, gap + 2 * margin) > gap + margin:
             return False
-        return bool(self._body(one).min_gap(self._body(other), 2 * gap) <= gap)
+        bodies = self._body(one), self._body(other)
+        if not may_share(*bodies) and (
+            is_seen_near(*bodies, gap) or is_seen_near(*bodies[::-1], gap)
+        ):
+            return True
+        return bool(bodies[0].min_gap(bodies[1], 2 * gap) <= gap)
 
     def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         one, other, pairs = self._labels[moving], self._labels[standing], self._found.pairs
@@ -192,7 +199,8 @@ class DrawnWays:
             free = depth <= TOLERANCE
             path.append(max(depth, finished))
             shift.append(at)
-            gap = CLEAR if coarse else self._gap(moving, standing, axis, sign, CLEAR)
+            wanted = free and not coarse
+            gap = self._gap(moving, standing, axis, sign, CLEAR) if wanted else CLEAR
             graze.append(-gap if free else depth)
             is_deeper = depth > finished + TOLERANCE
             may_cut = met is not None and met is not coarse and not is_deeper
@@ -264,6 +272,8 @@ class DrawnWays:
         """How deep the first part gets into the second on its way, and where [m]; None if they do
         not meet. The depth of a clash that is deep may be found too small."""
         ways = self._swept(moving, axis, sign), self._body(standing)
+        if not may_share(*ways):
+            return None
         shared = ways[0] ^ ways[1]
         cut = common(*ways, both=False, samples=QUICK, shared=shared)
         if not cut.volume:
@@ -286,7 +296,10 @@ class DrawnWays:
     def _gap(self, moving: int, standing: int, axis: int, sign: int, most: float) -> float:
         """The least room on the way of a part, but for the last bit of it [m], up to `most`."""
         ahead = self._swept(moving, axis, sign).translate(sign * LAST * np.eye(3)[axis])
-        return float(ahead.min_gap(self._body(standing), most))
+        body = self._body(standing)
+        if not may_share(ahead, body) and is_seen_near(ahead.bodies[0], body):
+            return 0.0  # flush faces have many triangles that are as near
+        return float(ahead.min_gap(body, most))
 
     def _body(self, part: int) -> Any:
         return drawn(self._solids[part])
