@@ -10,6 +10,7 @@ a part than the two share in the finished product *cuts*, whatever its depth.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -47,6 +48,13 @@ QUICK, SURELY = 8, 10 * TOLERANCE
 
 DECIMATED = 1e-4
 """How far a decimated part may be from the part [m], where a coarse look may suffice."""
+
+
+Watch = Callable[[], None]
+"""What is called often, and may raise."""
+
+NONE: Watch = lambda: None  # noqa: E731
+"""Nothing is watched."""
 
 
 class _Measurements:
@@ -94,10 +102,10 @@ def _ordered(row: tuple[Any, ...], order: slice) -> tuple[Any, ...]:
 
 class DrawnWays:
     """The parts of a product by number, and how deep they get into each other as drawn. What
-    is found of them is kept with the product."""
+    is found of them is kept with the product. `watch` is called before each pair."""
 
-    def __init__(self, bodies: ConvexBodies) -> None:
-        self._solids = bodies.solids
+    def __init__(self, bodies: ConvexBodies, watch: Watch = NONE) -> None:
+        self._solids, self._watch = bodies.solids, watch
         self._labels = [solid.label for solid in bodies.solids]
         self._found = bodies.product.kept(_Measurements, frozenset(self._labels))
 
@@ -167,6 +175,7 @@ class DrawnWays:
         return np.array([self._is_near(a, b, gap) for a, b in pairs], bool)
 
     def _is_near(self, one: int, other: int, gap: float) -> bool:
+        self._watch()
         coarse, margin = [self._coarse(part) for part in (one, other)], self._margin(one, other)
         if margin and coarse[0].body.min_gap(coarse[1].body, gap + 2 * margin) > gap + margin:
             return False
@@ -192,6 +201,7 @@ class DrawnWays:
             return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2, [False] * 2
         path, shift, graze, cuts = [], [], [], []
         for sign in SIGNS:
+            self._watch()
             clear = self._is_free(moving, standing, axis, sign)
             coarse = (0.0, 0.0) if clear else self._coarsely(moving, standing, axis, sign)
             met = coarse or self._path(moving, standing, axis, sign)
