@@ -9,7 +9,7 @@ completely. The graph of the opposite direction is its transpose.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -23,7 +23,6 @@ from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.mating.bodies import ConvexBodies, bodies
-from factory.floor.mating.drawn import NONE, Watch
 from factory.floor.mating.mating import AMPLE
 from factory.floor.mating.meetings import Meeting, Meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
@@ -236,7 +235,7 @@ def closure(relation: NDArray[np.bool_]) -> NDArray[np.bool_]:
         reach = further
 
 
-def blocking(source: InPlace, watch: Watch = NONE) -> Blocking:
+def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Blocking:
     """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
     many lie behind one another. `watch` is called often, and may raise."""
     units = source.units()
@@ -276,7 +275,9 @@ def rooms(source: InPlace, axis: int) -> Array:
     return np.where(room >= AMPLE, np.inf, room)
 
 
-def _bodies(source: InPlace, watch: Watch = NONE) -> tuple[Finder, ConvexBodies, Indices]:
+def _bodies(
+    source: InPlace, watch: Callable[[], None] = lambda: None
+) -> tuple[Finder, ConvexBodies, Indices]:
     """The convex bodies of all parts, unit by unit, and the unit of each part."""
     units, labels = source.units(), tuple(source.product.solids)
     unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
