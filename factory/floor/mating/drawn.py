@@ -53,6 +53,9 @@ DECIMATED = 1e-4
 Watch = Callable[[], None]
 """What is called before each pair, and may raise."""
 
+NONE: Watch = lambda: None  # noqa: E731
+"""Nothing is called."""
+
 
 class _Measurements:
     """Measurements of some parts of a product, by label: the sweep of each, the penetration depth
@@ -101,7 +104,7 @@ class DrawnWays:
     """The parts of a product by number, and how deep they get into each other as drawn. What
     is found of them is kept with the product. `watch` is called before each pair."""
 
-    def __init__(self, bodies: ConvexBodies, watch: Watch = lambda: None) -> None:
+    def __init__(self, bodies: ConvexBodies, watch: Watch = NONE) -> None:
         self._solids, self._watch = bodies.solids, watch
         self._labels = [solid.label for solid in bodies.solids]
         self._found = bodies.product.kept(_Measurements, frozenset(self._labels))

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from factory.floor.geometry import overlap
 from factory.floor.mating.bodies import ROUNDING, BodyShapes, ConvexBodies
 from factory.floor.mating.boxes import box_depths
-from factory.floor.mating.drawn import DrawnWays, Watch
+from factory.floor.mating.drawn import NONE, DrawnWays, Watch
 from factory.floor.mating.meetings import Meetings
 from factory.floor.mating.paths import CLEAR, MANY, TOLERANCE, WAYS, Depths, depths_of, sought
 from factory.support.arrays import Array, Indices
@@ -123,11 +123,7 @@ class Finder:
     but by their boxes. `watch` is called before each of these pairs."""
 
     def __init__(
-        self,
-        convex: ConvexBodies,
-        where: Meetings,
-        as_drawn: bool = False,
-        watch: Watch = lambda: None,
+        self, convex: ConvexBodies, where: Meetings, as_drawn: bool = False, watch: Watch = NONE
     ) -> None:
         self.bodies, self.meetings, self.as_drawn = convex, where, as_drawn
         self.drawn = DrawnWays(convex, watch)
