@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from manifold3d import Manifold
 
 from factory.floor.geometry.limits import METRES
 from factory.floor.geometry.meshes import MOST_FACES, usable
+from factory.floor.geometry.overlap import is_seen_near, may_share
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
@@ -97,3 +99,13 @@ def test_an_overlap_that_is_all_facets_is_said_to_be_and_may_be_allowed() -> Non
         assert fault is not None
         assert ("may be their facets" in fault.message) == is_facets
         assert (fault.hint or "").endswith(f"peg:hole:{1e3 * sagitta:g}mm") == is_facets
+
+
+@pytest.mark.parametrize(
+    ("up", "shares", "near"), [(1.0, False, True), (1.01, False, False), (0.99, True, False)]
+)
+def test_plates_that_lie_on_each_other_share_nothing_and_are_near(up, shares, near) -> None:
+    plate = Manifold.cube((3.0, 3.0, 1.0)).refine(4)
+    other = plate.translate((0.3, 0.2, up))
+    assert (may_share(plate, other), is_seen_near(plate, other)) == (shares, near)
+    assert is_seen_near(plate, other, 0.02) == (up >= 1) or shares

@@ -57,6 +57,7 @@ import resource, sys
 hard = resource.getrlimit(resource.RLIMIT_AS)[1]
 most = {MEMORY} if hard == resource.RLIM_INFINITY else min(hard, {MEMORY})
 resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+sys.modules["trimesh"] = None  # cascadio registers a handler there, and runs without
 import cascadio
 cascadio.step_to_glb(sys.argv[1], sys.argv[2], float(sys.argv[3]))
 """
@@ -69,6 +70,15 @@ STEPS = FINE, _, COARSE = 0.01, 0.03, 0.1
 SHARE = 1e-4
 """The distance is at most this share of the longest edge of a component's box: a fine step would
 give a large component a hundred thousand triangles."""
+
+SMALL = 0.98 * STEPS[1] / SHARE
+"""Components below this size [mm] are read finely, however coarse the triangles are by which it is
+known."""
+
+POINTS = re.compile(rb"CARTESIAN_POINT\s*\(\s*'[^']*'\s*,\s*\(([^)]*)\)")
+MILLIMETRES, LOOKED_AT = re.compile(rb"\.MILLI\.\s*,\s*\.METRE\."), 1 << 22
+"""Points of a STEP file, what says that they are in millimetres, and in how many bytes these are
+sought."""
 
 
 def read_scene(content: bytes, suffix: str) -> Bodies:
@@ -101,7 +111,7 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
         if len(solids) > 1
     ]
     apart = [body for solids in parts for body in solids]
-    return Bodies(tuple(apart), *stated, (*dict.fromkeys(notes), *_merged(apart)))
+    return Bodies(tuple(apart), *stated, tuple(dict.fromkeys(notes)))
 
 
 def _few(bodies: list[GlbBody]) -> list[GlbBody]:
@@ -146,15 +156,16 @@ def read_one(path: Path, content: bytes) -> Bodies:
 def read_step(content: bytes) -> list[GlbBody]:
     """The components of a STEP file that have faces, in metres, with the colours that the file
     states. Raises UnreadableMesh, and MissingError without cascadio."""
-    optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
     if BEGIN not in content[:4096]:
         raise UnreadableMesh(f"it is not {EXPECTED['.step']}")
     with TemporaryDirectory() as folder:
         source = Path(folder) / "a.step"
         source.write_bytes(content)
-        made = {COARSE: _triangles(source, COARSE)}
-        wanted = [_deflection(body) for body in made[COARSE]]
-        made |= {one: _triangles(source, one) for one in {*wanted} - {COARSE}}
+        made = {FINE: _triangles(source, FINE)} if _seems_small(content) else {}
+        if not made or any(_longest(body) > SMALL for body in made[FINE]):
+            made[COARSE] = _triangles(source, COARSE)
+        wanted = [_deflection(body) for body in made[max(made)]]
+        made |= {one: _triangles(source, one) for one in {*wanted} - {*made}}
     finest = made[min(made)]
     if any(len(bodies) != len(finest) for bodies in made.values()):
         wanted = [min(made)] * len(finest)
@@ -162,17 +173,33 @@ def read_step(content: bytes) -> list[GlbBody]:
     return [GlbBody(body.names, body.bodies, tuple(map(_stated, body.colours))) for body in bodies]
 
 
+def _seems_small(content: bytes) -> bool:
+    """Whether all points of a STEP file are so near each other that each component is likely to be
+    read finely."""
+    if not MILLIMETRES.search(content):
+        return False
+    words = b",".join(POINTS.findall(content[:LOOKED_AT])).split(b",")
+    try:
+        return bool(np.ptp(np.array(words, float)) < SMALL)
+    except ValueError:
+        return False
+
+
+def _longest(body: GlbBody) -> float:
+    """The longest edge of the box of a component [mm]."""
+    points = np.concatenate([vertices for vertices, _ in body.bodies])
+    return 1e3 * float(np.ptp(points, axis=0).max())
+
+
 def _deflection(body: GlbBody) -> float:
     """How far the triangles of a component may be from its faces [mm]: a step between FINE and
     COARSE that is at most a SHARE of the longest edge of its box."""
-    points = np.concatenate([vertices for vertices, _ in body.bodies])
-    longest = 1e3 * float(np.ptp(points, axis=0).max())
-    return max((step for step in STEPS if step <= SHARE * longest), default=FINE)
+    return max((step for step in STEPS if step <= SHARE * _longest(body)), default=FINE)
 
 
 def _triangles(source: Path, deflection: float) -> list[GlbBody]:
     """The components of a STEP file, at most so far from their faces [mm]. Raises
-    UnreadableMesh."""
+    UnreadableMesh, and MissingError without cascadio, which takes long to load."""
     made, none = source.with_suffix(".glb"), subprocess.DEVNULL
     made.unlink(missing_ok=True)
     words = [sys.executable, "-c", CONVERT, str(source), str(made), str(deflection)]
@@ -180,6 +207,7 @@ def _triangles(source: Path, deflection: float) -> list[GlbBody]:
         words, cwd=source.parent, stdin=none, stdout=none, stderr=none, check=False
     )
     if not made.exists():
+        optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
         ended = f"; it ended with status {done.returncode}" if done.returncode else ""
         why = f"OpenCASCADE finds no faces in it{ended}; it should be {EXPECTED['.step']}"
         raise UnreadableMesh(why)

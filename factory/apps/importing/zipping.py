@@ -26,12 +26,14 @@ def zipped(vertices: Array, faces: Indices) -> Indices:
 def _rims(faces: Indices) -> list[list[int]]:
     """The holes of a mesh: the shortest cycles of its open edges, each edge in one, in the
     orientation of the triangles that close them."""
+    edges = np.concatenate([faces[:, [1, 0]], faces[:, [2, 1]], faces[:, [0, 2]]])
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    key = low * (faces.max(initial=0) + 1) + high
+    _, first, count = np.unique(key, return_index=True, return_counts=True)
+    if not (count == 1).any():
+        return []
     import networkx as nx
 
-    edges = np.concatenate([faces[:, [1, 0]], faces[:, [2, 1]], faces[:, [0, 2]]])
-    _, first, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
     border = nx.Graph(edges[first[count == 1]].tolist())
     rims: list[list[int]] = []
     for start, end in edges[first[count == 1]].tolist():

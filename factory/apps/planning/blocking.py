@@ -9,7 +9,7 @@ completely. The graph of the opposite direction is its transpose.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -235,11 +235,11 @@ def closure(relation: NDArray[np.bool_]) -> NDArray[np.bool_]:
         reach = further
 
 
-def blocking(source: InPlace) -> Blocking:
+def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Blocking:
     """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
-    many lie behind one another."""
+    many lie behind one another. `watch` is called often, and may raise."""
     units = source.units()
-    finder, convex, unit = _bodies(source)
+    finder, convex, unit = _bodies(source, watch)
     count = len(units)
     levels, depths = np.zeros((3, count, count), np.int8), np.zeros((3, count, count))
     for axis in AXES:
@@ -275,7 +275,9 @@ def rooms(source: InPlace, axis: int) -> Array:
     return np.where(room >= AMPLE, np.inf, room)
 
 
-def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Indices]:
+def _bodies(
+    source: InPlace, watch: Callable[[], None] = lambda: None
+) -> tuple[Finder, ConvexBodies, Indices]:
     """The convex bodies of all parts, unit by unit, and the unit of each part."""
     units, labels = source.units(), tuple(source.product.solids)
     unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
@@ -283,7 +285,7 @@ def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Indices]:
     every = Meeting("", (), 0, 0, 0, len(labels), either=True)
     borders, levels = np.zeros(len(labels) - 1, np.int64), np.zeros(1, np.int64)
     meetings = Meetings(labels, (every,), borders, levels)
-    return Finder(convex, meetings, as_drawn=True), convex, unit
+    return Finder(convex, meetings, True, watch), convex, unit
 
 
 def _hidden(overlaps: Overlaps, unit: Indices, labels: Sequence[str]) -> tuple[Overlapping, ...]:

@@ -64,7 +64,8 @@ LAYING = "laying out"
 """The name of the last stage of planning."""
 
 GRACE = 1.0
-"""If the time is over, decomposition before the first layout may still take so long [s]."""
+"""If the time is over, what blocks what may still be computed for so long, and decomposition before
+the first layout may still take so long [s]."""
 
 HELD, AGAIN = 3, 1
 """So often trees of a few units are sought again in which what no hand can hold is joined
@@ -185,7 +186,13 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     asked = options or PlanOptions()
     budget = budget_of(len(source.units()), asked.seconds, asked.stopped)
     asked.told("computing what blocks what", 0, None, "")
-    graphs = blocking(source)
+
+    def watch() -> None:
+        if budget.elapsed > budget.seconds + GRACE:
+            message = "the time was over before it was known what blocks what: there is no tree"
+            raise InputError(Diagnostic("Usage", message, None, "give it more --seconds, or none"))
+
+    graphs = blocking(source, watch)
     named = (*asked.allow, *([asked.base] if asked.base else ()), *(asked.screws or ()))
     _check_named(named, graphs)
     pairs = graphs.hidden
@@ -194,7 +201,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     graphs = graphs.allowing(asked.allow)
 
     def graph(source: InPlace) -> Blocking:
-        return blocking(source).allowing(asked.allow)
+        return blocking(source, watch).allowing(asked.allow)
 
     screws = () if asked.screws is None else fasteners(source, asked.screws)
     pose = posed(source, graphs, asked.up, graph, screws)

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from factory.floor.geometry.merging import merged_vertices
 from factory.support.arrays import Array, Indices
 
 CLOSE, DIGITS = 2e-5, 1e-6
@@ -82,15 +83,9 @@ class RigidMotion:
     shift: Array = field(default_factory=lambda: np.zeros(3))
 
 
-@np.errstate(all="ignore")
 def shape_of(vertices: Array, faces: Indices) -> PartShape:
     """The shape of a mesh that may have duplicate and unused vertices."""
-    import trimesh
-
-    body = trimesh.Trimesh(vertices, faces, process=False)
-    body.merge_vertices(merge_tex=True, merge_norm=True)
-    used, corners = np.unique(np.asarray(body.faces), return_inverse=True)
-    return PartShape(np.asarray(body.vertices)[used], corners.reshape(-1, 3))
+    return PartShape(*merged_vertices(vertices, faces))
 
 
 def motion_between(one: PartShape, other: PartShape) -> RigidMotion | None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.floor.geometry.merging import merged_vertices
 from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.pieces import joined
 from factory.support.arrays import Array, Indices
@@ -64,12 +65,7 @@ def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
     return MeshFile(tuple(meshes))
 
 
-@np.errstate(all="ignore")
 def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
-    import trimesh
-
-    body = trimesh.Trimesh(vertices, faces, process=False)
-    body.merge_vertices()
-    merged = np.asarray(body.faces)
+    vertices, merged = merged_vertices(vertices, faces)
     whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
-    return np.asarray(body.vertices), merged[whole] if whole.any() else merged
+    return vertices, merged[whole] if whole.any() else merged

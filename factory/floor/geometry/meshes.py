@@ -223,8 +223,8 @@ def is_closed(faces: Indices) -> bool:
     directions. This also holds for bodies that share faces, edges or corners."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     edge = np.minimum(start, end) * (faces.max(initial=0) + 1) + np.maximum(start, end)
-    _, inverse = np.unique(edge, return_inverse=True)
-    return bool((np.bincount(inverse, np.where(start < end, 1.0, -1.0)) == 0).all())
+    forth, back = (np.sort(edge[way]) for way in (start < end, start >= end))
+    return bool(np.array_equal(forth, back))
 
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:

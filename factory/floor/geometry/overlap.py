@@ -49,11 +49,15 @@ SAMPLES = 128
 LEAST = 1e-15
 """Smaller common volumes are rounding errors [m³]: a millionth of a cubic millimetre."""
 
+ON, SEEN = 1e-12, 32
+"""A vertex is on a body that is so near [m]; and how many are looked at."""
+
 BEYOND = 1e-9
 """The distance behind its face at which a chord begins [m]."""
 
-RAY = np.sqrt([2.0, 3.0, 5.0]) / np.sqrt(10.0)
-"""The direction of rays that tell inside from outside: no special one."""
+RAY = np.array([1.0, 1e-3 * 2**0.5, 1e-3 * 3**0.5]) / np.sqrt(1 + 5e-6)
+"""The direction of rays that tell inside from outside: no special one, but nearly along an axis, so
+that the box of a ray has few triangles."""
 
 AT_ONCE = 16
 """So many points are measured before it is looked whether others may be deeper."""
@@ -240,12 +244,34 @@ def united(bodies: Iterable[Any]) -> float:
     return float(Manifold.batch_boolean([*bodies], OpType.Add).volume())
 
 
+def may_share(one: Any, other: Any) -> bool:
+    """Whether the boxes of two bodies have a volume in common that is no rounding error: those of
+    plates that lie on each other have none, whose common volume takes long to be found."""
+    (low, high), (least, most) = (np.reshape(body.bounding_box(), (2, 3)) for body in (one, other))
+    return bool(np.prod(np.maximum(np.minimum(high, most) - np.maximum(low, least), 0.0)) > LEAST)
+
+
+def is_seen_near(one: Any, other: Any, gap: float = ON) -> bool:
+    """Whether a vertex of one body is seen to be so near the surface of the other [m]: SEEN at most
+    are looked at."""
+    low, high = np.reshape(other.bounding_box(), (2, 3))
+    vertices = merged(one.to_mesh64())[0]
+    beside = ((vertices >= low - gap) & (vertices <= high + gap)).all(axis=1)
+    near = vertices[beside][:: max(1, -(-beside.sum() // SEEN))]
+    if not len(near):
+        return False
+    surface, faces = merged(other.to_mesh64())
+    return bool(distances_to(near, surface[faces]).min() <= gap)
+
+
 def common(
     one: Any, other: Any, both: bool = True, samples: int = SAMPLES, shared: Any = None
 ) -> Common:
     """The overlap of two bodies. `both`: the depth is the lesser of the two erosions; otherwise
     that of the `other`. With few `samples` the depth is a lower bound, computed faster. `shared`:
     their common volume, where it is known."""
+    if not may_share(one, other):
+        return APART
     shared = one ^ other if shared is None else shared
     volume = float(shared.volume())
     if shared.is_empty() or volume <= LEAST:

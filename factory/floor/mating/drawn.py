@@ -10,6 +10,7 @@ a part than the two share in the finished product *cuts*, whatever its depth.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -24,6 +25,8 @@ from factory.floor.geometry.overlap import (
     bounded,
     common,
     drawn,
+    is_seen_near,
+    may_share,
     overlap_of,
     swept,
     united,
@@ -45,6 +48,13 @@ QUICK, SURELY = 8, 10 * TOLERANCE
 
 DECIMATED = 1e-4
 """How far a decimated part may be from the part [m], where a coarse look may suffice."""
+
+
+Watch = Callable[[], None]
+"""What is called before each pair, and may raise."""
+
+NONE: Watch = lambda: None  # noqa: E731
+"""Nothing is called."""
 
 
 class _Measurements:
@@ -92,10 +102,10 @@ def _ordered(row: tuple[Any, ...], order: slice) -> tuple[Any, ...]:
 
 class DrawnWays:
     """The parts of a product by number, and how deep they get into each other as drawn. What
-    is found of them is kept with the product."""
+    is found of them is kept with the product. `watch` is called before each pair."""
 
-    def __init__(self, bodies: ConvexBodies) -> None:
-        self._solids = bodies.solids
+    def __init__(self, bodies: ConvexBodies, watch: Watch = NONE) -> None:
+        self._solids, self._watch = bodies.solids, watch
         self._labels = [solid.label for solid in bodies.solids]
         self._found = bodies.product.kept(_Measurements, frozenset(self._labels))
 
@@ -165,10 +175,16 @@ class DrawnWays:
         return np.array([self._is_near(a, b, gap) for a, b in pairs], bool)
 
     def _is_near(self, one: int, other: int, gap: float) -> bool:
+        self._watch()
         coarse, margin = [self._coarse(part) for part in (one, other)], self._margin(one, other)
         if margin and coarse[0].body.min_gap(coarse[1].body, gap + 2 * margin) > gap + margin:
             return False
-        return bool(self._body(one).min_gap(self._body(other), 2 * gap) <= gap)
+        bodies = self._body(one), self._body(other)
+        if not may_share(*bodies) and (
+            is_seen_near(*bodies, gap) or is_seen_near(*bodies[::-1], gap)
+        ):
+            return True
+        return bool(bodies[0].min_gap(bodies[1], 2 * gap) <= gap)
 
     def _kept(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
         one, other, pairs = self._labels[moving], self._labels[standing], self._found.pairs
@@ -185,6 +201,7 @@ class DrawnWays:
             return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2, [False] * 2
         path, shift, graze, cuts = [], [], [], []
         for sign in SIGNS:
+            self._watch()
             clear = self._is_free(moving, standing, axis, sign)
             coarse = (0.0, 0.0) if clear else self._coarsely(moving, standing, axis, sign)
             met = coarse or self._path(moving, standing, axis, sign)
@@ -192,7 +209,8 @@ class DrawnWays:
             free = depth <= TOLERANCE
             path.append(max(depth, finished))
             shift.append(at)
-            gap = CLEAR if coarse else self._gap(moving, standing, axis, sign, CLEAR)
+            wanted = free and not coarse
+            gap = self._gap(moving, standing, axis, sign, CLEAR) if wanted else CLEAR
             graze.append(-gap if free else depth)
             is_deeper = depth > finished + TOLERANCE
             may_cut = met is not None and met is not coarse and not is_deeper
@@ -264,6 +282,8 @@ class DrawnWays:
         """How deep the first part gets into the second on its way, and where [m]; None if they do
         not meet. The depth of a clash that is deep may be found too small."""
         ways = self._swept(moving, axis, sign), self._body(standing)
+        if not may_share(*ways):
+            return None
         shared = ways[0] ^ ways[1]
         cut = common(*ways, both=False, samples=QUICK, shared=shared)
         if not cut.volume:
@@ -286,7 +306,10 @@ class DrawnWays:
     def _gap(self, moving: int, standing: int, axis: int, sign: int, most: float) -> float:
         """The least room on the way of a part, but for the last bit of it [m], up to `most`."""
         ahead = self._swept(moving, axis, sign).translate(sign * LAST * np.eye(3)[axis])
-        return float(ahead.min_gap(self._body(standing), most))
+        body = self._body(standing)
+        if not may_share(ahead, body) and is_seen_near(ahead.bodies[0], body):
+            return 0.0  # flush faces have many triangles that are as near
+        return float(ahead.min_gap(body, most))
 
     def _body(self, part: int) -> Any:
         return drawn(self._solids[part])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from factory.floor.geometry import overlap
 from factory.floor.mating.bodies import ROUNDING, BodyShapes, ConvexBodies
 from factory.floor.mating.boxes import box_depths
-from factory.floor.mating.drawn import DrawnWays
+from factory.floor.mating.drawn import NONE, DrawnWays, Watch
 from factory.floor.mating.meetings import Meetings
 from factory.floor.mating.paths import CLEAR, MANY, TOLERANCE, WAYS, Depths, depths_of, sought
 from factory.support.arrays import Array, Indices
@@ -120,11 +120,13 @@ Pairs = tuple[Indices, Indices, Indices, Depths]
 class Finder:
     """Finds overlaps in one product; shapes are kept with it, what is found in the user's cache.
     `as_drawn`: of parts that are tested as they are drawn, only that: their bodies are not compared
-    but by their boxes."""
+    but by their boxes. `watch` is called before each of these pairs."""
 
-    def __init__(self, convex: ConvexBodies, where: Meetings, as_drawn: bool = False) -> None:
+    def __init__(
+        self, convex: ConvexBodies, where: Meetings, as_drawn: bool = False, watch: Watch = NONE
+    ) -> None:
         self.bodies, self.meetings, self.as_drawn = convex, where, as_drawn
-        self.drawn = DrawnWays(convex)
+        self.drawn = DrawnWays(convex, watch)
         self._shapes = convex.product.kept(BodyShapes)
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:

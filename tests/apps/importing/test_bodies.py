@@ -46,19 +46,25 @@ def box(size: float) -> GlbBody:
     return GlbBody(("box",), ((np.array(made.vertices), np.array(made.faces)),), (None,))
 
 
+POINT = b"ISO-10303-21 SI_UNIT(.MILLI.,.METRE.) CARTESIAN_POINT('',(0.,50.,-9.))"
+
+
 @pytest.mark.parametrize(
-    ("millimetres", "lost", "deflections"),
+    ("content", "millimetres", "lost", "deflections", "steps"),
     [
-        ((50, 1500), {}, [FINE, COARSE]),
-        ((50, 290), {}, [FINE, FINE]),
-        ((50, 310), {}, [FINE, 0.03]),
-        ((50, 1500), {FINE: 1}, [FINE]),
+        (b"ISO-10303-21", (50, 1500), {}, [FINE, COARSE], [COARSE, FINE]),
+        (b"ISO-10303-21", (50, 290), {}, [FINE, FINE], [COARSE, FINE]),
+        (b"ISO-10303-21", (50, 310), {}, [FINE, 0.03], [COARSE, FINE, 0.03]),
+        (b"ISO-10303-21", (50, 1500), {FINE: 1}, [FINE], [COARSE, FINE]),
+        (POINT, (50, 290), {}, [FINE, FINE], [FINE]),
+        (POINT, (50, 310), {}, [FINE, 0.03], [FINE, COARSE, 0.03]),
     ],
 )
 def test_triangles_of_a_step_file_are_as_fine_as_each_part_needs(
-    millimetres, lost, deflections, monkeypatch: pytest.MonkeyPatch
+    content, millimetres, lost, deflections, steps, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All are as fine as the finest where other steps show other parts."""
+    """All are as fine as the finest where other steps show other parts. The points of a file say
+    whether all are likely to be read finely, and no more than that."""
     made: dict[float, list[GlbBody]] = {}
 
     def triangles(source: Path, deflection: float) -> list[GlbBody]:
@@ -67,9 +73,10 @@ def test_triangles_of_a_step_file_are_as_fine_as_each_part_needs(
 
     monkeypatch.setattr(scene_file, "optional", lambda *words: None)
     monkeypatch.setattr(scene_file, "_triangles", triangles)
-    bodies = read_step(b"ISO-10303-21")
+    bodies = read_step(content)
     of = [next(d for d in made for b in made[d] if b.bodies is body.bodies) for body in bodies]
     assert of == deflections
+    assert (next(iter(made)), {*made}) == (steps[0], {*steps})
 
 
 def test_models_of_a_3mf_file_may_be_as_large_as_the_limit(

@@ -276,6 +276,20 @@ def test_a_tree_is_written_however_long_its_parts_are_decomposed(tmp_path: Path,
     assert labels_of(Path(document["pag"])) and document["joins"] == []
 
 
+def test_ways_are_not_looked_at_for_longer_than_the_time_that_is_asked_for(
+    planning: Planning, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def long(source: object, watch: Callable[[], None]) -> None:
+        watch()
+        raise AssertionError("the time was not heard")
+
+    monkeypatch.setattr("factory.apps.planning.plan.GRACE", -1.0)
+    monkeypatch.setattr("factory.apps.planning.plan.blocking", long)
+    done = planning(LOADED, "--seconds", 0.001)
+    assert (done.status, done.codes) == (2, ["Usage"])
+    assert not (tmp_path / "out").exists()
+
+
 HEAVY = """root = all; all = mate ( stem, slab );
 stem = atomic ( box = ( 0.02, 0.01, 0.6 ), pos = ( 0, 0, 0.3 ) );
 slab = atomic ( box = ( 0.6, 0.6, 0.1 ), pos = ( 0, 0, 0.65 ), density = 8000 )
