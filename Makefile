@@ -5,6 +5,7 @@ FACTORY := $(PY) -m factory
 .PHONY: help demo test test-core test-all oracles bench fidelity faults compare docs gallery figures lint golden wheel setup clean
 
 help:
+	@echo "make setup     the tool and what its tests need, in .venv"
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
 	@echo "make test      all tests, the long campaigns aside"
 	@echo "make test-core those of them that need the core alone"
