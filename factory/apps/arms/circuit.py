@@ -56,13 +56,11 @@ class Candidates:
     Attributes:
         pairs: where it takes it and where it places it (k, 2, n) [rad, m].
         grips: number of the pair of poses that each belongs to (k,).
-        reached: how many configurations came to both, clear or not.
         blocked: what most of those that are not clear are too near to; None if all are clear.
     """
 
     pairs: Array
     grips: Index
-    reached: int
     blocked: NoWay | None
 
 
@@ -94,7 +92,7 @@ def candidates(
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
     blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
-    return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
+    return Candidates(pairs[clear], grips[follows][clear], blocked)
 
 
 def free_candidates(
@@ -107,12 +105,11 @@ def free_candidates(
 ) -> Candidates:
     """As `candidates`, but with two configurations that need not be on one branch, of which each is
     away from singular ones."""
-    visits, blocked, reached = list[tuple[Array, Index]](), list[NoWay](), 0
+    visits, blocked = list[tuple[Array, Index]](), list[NoWay]()
     both = [_reaching(chain, poses, near) for poses in (takes, puts)]
     ended = _with_ends(chain, [q for q, _, _ in both], ends)
     for (q, good, grips), (asked, follows) in zip(both, ended, strict=True):
         good &= follows & (least_singular_value(chain, q) >= SINGULAR)
-        reached += int(good.any())
         margin, pair = _asked(clearance, asked, good)
         clear = margin.min(axis=0, initial=np.inf) >= 0.0
         obstacle = None if clear.any() else _obstacle(margin, pair)
@@ -122,7 +119,7 @@ def free_candidates(
     i, j = np.nonzero(first[:, None] == last)
     after, inside = nearest_in_range(chain, other[j], one[i])
     pairs = np.stack([one[i], after], axis=1)[inside]
-    return Candidates(pairs, first[i][inside], reached, blocked[0] if blocked else None)
+    return Candidates(pairs, first[i][inside], blocked[0] if blocked else None)
 
 
 def _reaching(

@@ -228,7 +228,7 @@ class ArmPlanner:
             return {f"'{label}'", feeder_name(label), *self._moving}
         line = cell.lines[burden.source]
         there = {placed_name(part, line) for part in burden.parts}
-        touched = there if loaded else {placed_name(burden.held, line)}
+        touched = there if loaded else {placed_name(burden.hold.part, line)}
         return {line.name, *self._moving} - (there - touched)
 
     def _spared_under(self, label: str) -> set[str]:

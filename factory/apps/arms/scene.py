@@ -165,7 +165,7 @@ class Scene:
         boxes = [each for name, each in self._boxes.items() if name not in spared]
         margin, pair = np.full(len(q), FAR - need), np.zeros(len(q), int)
         for first in range(0, len(q), ROWS):
-            places, turns = self._poses(q[first : first + ROWS])
+            places, turns = self.poses(q[first : first + ROWS])
             near = self._near(places, moving, boxes, need), self._near_own(places, own)
             rows, bounds, pairs = (np.concatenate(each) for each in zip(*near, strict=True))
             needs = np.repeat([need, OWN], [len(each[0]) for each in near])
@@ -174,8 +174,8 @@ class Scene:
             for row in np.flatnonzero(np.diff(ends)).tolist():
                 asked = order[ends[row] : ends[row + 1]]
                 values = (each[asked].tolist() for each in (bounds, pairs, needs))
-                self.d.geom_xpos[self._moves] = places[row, self._moves]
-                self.d.geom_xmat[self._moves] = turns[row]
+                self.d.geom_xpos[self.moves] = places[row, self.moves]
+                self.d.geom_xmat[self.moves] = turns[row]
                 least = self._least(margin[first + row], zip(*values, strict=True))
                 margin[first + row], pair[first + row] = least
         return margin, pair
@@ -194,23 +194,19 @@ class Scene:
                 margin, pair = away, one * self.m.ngeom + other
         return margin, pair
 
-    def _poses(self, q: Array) -> tuple[Array, Array]:
+    def poses(self, q: Array) -> tuple[Array, Array]:
         """The middles of geoms in configurations (m, n): (m, geoms, 3) [m], and the orientations of
         those that are not still (m, k, 9)."""
-        m, d = self.m, self.d
-        places = np.tile(m.geom_pos, (len(q), 1, 1))
-        turns = np.empty((len(q), len(self._moves), 9))
+        d, moves, places = self.d, self.moves, np.tile(self.m.geom_pos, (len(q), 1, 1))
+        turns = np.empty((len(q), len(moves), 9))
         for row, one in enumerate(q):
             d.qpos[:] = one
-            mujoco.mj_kinematics(m, d)
-            places[row, self._moves], turns[row] = (
-                d.geom_xpos[self._moves],
-                d.geom_xmat[self._moves],
-            )
+            mujoco.mj_kinematics(self.m, d)
+            places[row, moves], turns[row] = d.geom_xpos[moves], d.geom_xmat[moves]
         return places, turns
 
     @cached_property
-    def _moves(self) -> Index:
+    def moves(self) -> Index:
         """The geoms of the arm, and what it may hold."""
         return np.setdiff1d(np.arange(self.m.ngeom), self.still)
 
