@@ -138,9 +138,9 @@ def _with_ends(
     """The configurations (m, n) of each visit with those at the far ends of its lines of the tool
     from there, and whether the arm follows all of these lines (m,)."""
     starts = [q for q, lines in zip(visits, ends, strict=True) for _ in lines]
-    found = iter(tool_lines(chain, starts, [offsets for lines in ends for offsets in lines]))
+    made = iter(tool_lines(chain, starts, [offsets for lines in ends for offsets in lines]))
     for q, lines in zip(visits, ends, strict=True):
-        rows, good = zip(*(next(found) for _ in lines), strict=True)
+        rows, good = zip(*(next(made) for _ in lines), strict=True)
         yield [q, *(row[:, -1] for row in rows)], np.logical_and.reduce(good)
 
 

@@ -201,12 +201,12 @@ def tool_lines(
         starts: for each line configurations at its beginning (m, n) [rad, m].
         lines: offsets of the places of each from its beginning, which is the first (k, 3) [m].
     """
-    found = dict[int, tuple[Array, Truth]]()
+    rows = dict[int, tuple[Array, Truth]]()
     for count in dict.fromkeys(map(len, lines)):
         which = [n for n, line in enumerate(lines) if len(line) == count]
         many = [len(starts[n]) for n in which]
         offsets = np.repeat(np.stack([lines[n] for n in which], axis=1), many, axis=1)
         made = tool_line(chain, np.concatenate([starts[n] for n in which]), offsets)
         split = (np.split(each, np.cumsum(many)[:-1]) for each in made)
-        found.update(zip(which, zip(*split, strict=True), strict=True))
-    return [found[n] for n in range(len(lines))]
+        rows.update(zip(which, zip(*split, strict=True), strict=True))
+    return [rows[n] for n in range(len(lines))]

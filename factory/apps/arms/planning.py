@@ -256,8 +256,8 @@ class ArmPlanner:
         from the visit, and whether the arm follows them."""
         rises = [rise for label in self.labels for rise in self._rises(label)]
         starts = [q[None] for _, taken, placed in visits for q in (taken, taken, placed, placed)]
-        found = tool_lines(self.chain, starts, [rise.places @ self._turn.T for rise in rises])
-        lines = [(rise, row[0], bool(good)) for rise, (row, good) in zip(rises, found, strict=True)]
+        made = tool_lines(self.chain, starts, [rise.places @ self._turn.T for rise in rises])
+        lines = [(rise, row[0], bool(good)) for rise, (row, good) in zip(rises, made, strict=True)]
         return [lines[n : n + 4] for n in range(0, len(lines), 4)]
 
     def _end(self, label: str, rise: Rise, rows: Array, good: bool) -> StraightEnd:

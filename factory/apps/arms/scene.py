@@ -160,20 +160,21 @@ class Scene:
             held: whether what it holds counts.
         """
         loads = self.loads.get(label, []) if held else []
-        others = [*self._own, *((g, k) for g in loads for k in self._far_links)]
-        own, moving = np.array(others, int).reshape(-1, 2), np.array([*self.links, *loads])
+        pairs = [*self._own, *((g, k) for g in loads for k in self._far_links)]
+        links = np.array(pairs, int).reshape(-1, 2)
+        moving = np.array([*self.links, *loads])
         boxes = [each for name, each in self._boxes.items() if name not in spared]
         margin, pair = np.full(len(q), FAR - need), np.zeros(len(q), int)
         for first in range(0, len(q), ROWS):
             places, turns = self.poses(q[first : first + ROWS])
-            near = self._near(places, moving, boxes, need), self._near_own(places, own)
-            rows, bounds, pairs = (np.concatenate(each) for each in zip(*near, strict=True))
+            near = self._near(places, moving, boxes, need), self._near_own(places, links)
+            rows, bounds, geoms = (np.concatenate(each) for each in zip(*near, strict=True))
             needs = np.repeat([need, OWN], [len(each[0]) for each in near])
             order = np.lexsort((bounds, rows))
             ends = np.searchsorted(rows[order], np.arange(len(places) + 1))
             for row in np.flatnonzero(np.diff(ends)).tolist():
                 asked = order[ends[row] : ends[row + 1]]
-                values = (each[asked].tolist() for each in (bounds, pairs, needs))
+                values = (each[asked].tolist() for each in (bounds, geoms, needs))
                 self.d.geom_xpos[self.moves] = places[row, self.moves]
                 self.d.geom_xmat[self.moves] = turns[row]
                 least = self._least(margin[first + row], zip(*values, strict=True))
