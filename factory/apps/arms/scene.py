@@ -170,7 +170,7 @@ class Scene:
             near = self._near(places, moving, boxes, need), self._near_own(places, links)
             rows, bounds, geoms = (np.concatenate(each) for each in zip(*near, strict=True))
             needs = np.repeat([need, OWN], [len(each[0]) for each in near])
-            order = np.lexsort((bounds, rows))
+            order = np.lexsort((np.maximum(bounds, 0.0), rows))
             ends = np.searchsorted(rows[order], np.arange(len(places) + 1))
             for row in np.flatnonzero(np.diff(ends)).tolist():
                 asked = order[ends[row] : ends[row + 1]]
@@ -189,7 +189,7 @@ class Scene:
         pair = 0
         for bound, (one, other), need in asked:
             if bound >= margin:
-                break
+                continue
             away = mujoco.mj_geomDistance(self.m, self.d, one, other, FAR, None) - need
             if away < margin:
                 margin, pair = away, one * self.m.ngeom + other
