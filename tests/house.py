@@ -203,7 +203,7 @@ VAGUE = frozenset({"found", "told", "given", "known", "own"})
 
 ENGINE_WRITERS = (
     *("engine/simulation/mujoco", "engine/mjcf", "apps/deviations", "apps/recovery"),
-    *("apps/fidelity/solid", "apps/arms/scene", "apps/arms/sharing"),
+    *("apps/fidelity/solid", "apps/arms/scene"),
 )
 """Where the engine's model and data are written: those of a run, and those of a replica that no run
 uses."""

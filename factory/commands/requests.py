@@ -132,9 +132,7 @@ class ProjectOptions:
             project = project.with_pag(project.pag.in_order(self.order.split(",")))
         kept = defaults_for(self.file)
         if self.arm is not None:
-            from factory.apps.arms.ground import with_arm
-
-            return with_arm(project, self.arm)
+            return self._with_arm(project, self.arm, silent)
         if arms := kept.arms():
             from factory.apps.arms.ground import with_arms
 
@@ -177,6 +175,19 @@ class ProjectOptions:
         from factory.apps.log.plan_file import read_plan
 
         return read_plan(self.file)
+
+    def _with_arm(self, project: Project, arm: str, silent: bool) -> Project:
+        """The project of a cell with the arms that are asked for, or with few for --cycle."""
+        from factory.apps.arms.few_arms import with_few_arms
+        from factory.apps.arms.ground import with_arm
+        from factory.support.console import warn
+
+        if self.cycle is None:
+            return with_arm(project, arm)
+        warnings = list[Diagnostic]()
+        made = with_few_arms(project, arm, self.cycle, warnings.append)
+        warn(warnings, silent)
+        return made
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
         """The project with the plan that is found for --robots and --cycle."""

@@ -12,7 +12,6 @@ import numpy as np
 from factory.api import Array, Factory, Operation, Product, Solid
 from factory.apps.arms.chain import steiner
 from factory.apps.arms.holds import UP, Hold, holds
-from factory.floor.geometry.suction import PadPlace
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +79,6 @@ class Burden:
     def stops(self) -> dict[int | None, Operation]:
         """By carriers (index) the operation in which an arm places it on that, or takes it."""
         return {self.onto: self.join, self.source: self.takes}
-
-    @property
-    def held(self) -> str:
-        """The part that a pad is on."""
-        return self.hold.part
-
-    @property
-    def pad(self) -> PadPlace:
-        """Where the pad is on it."""
-        return self.hold.pad
 
     @property
     def comes(self) -> Array:

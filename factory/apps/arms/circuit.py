@@ -6,7 +6,7 @@ the joint line between them stays away from singular configurations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from factory.apps.arms.inverse import (
     least_singular_value,
     nearest_in_range,
     solutions,
-    tool_line,
+    tool_lines,
 )
 from factory.apps.arms.legs import Clearance, NoWay
 
@@ -56,13 +56,11 @@ class Candidates:
     Attributes:
         pairs: where it takes it and where it places it (k, 2, n) [rad, m].
         grips: number of the pair of poses that each belongs to (k,).
-        reached: how many configurations came to both, clear or not.
         blocked: what most of those that are not clear are too near to; None if all are clear.
     """
 
     pairs: Array
     grips: Index
-    reached: int
     blocked: NoWay | None
 
 
@@ -88,14 +86,13 @@ def candidates(
     other, joined = partners(chain, q, puts[0][grips], puts[1][grips])
     joined &= good
     grips, q, other = grips[joined], q[joined], other[joined]
-    there, goes = _with_ends(chain, q, ends[0])
-    here, comes = _with_ends(chain, other, ends[1])
+    (there, goes), (here, comes) = _with_ends(chain, (q, other), ends)
     follows = goes & comes
     margin, pair = _asked(clearance, [*there, *here], follows)
     clear = margin.min(axis=0, initial=np.inf) >= 0.0
     pairs = np.stack([q, other], axis=1)[follows]
     blocked = _obstacle(margin[:, ~clear], pair[:, ~clear])
-    return Candidates(pairs[clear], grips[follows][clear], len(pairs), blocked)
+    return Candidates(pairs[clear], grips[follows][clear], blocked)
 
 
 def free_candidates(
@@ -108,12 +105,11 @@ def free_candidates(
 ) -> Candidates:
     """As `candidates`, but with two configurations that need not be on one branch, of which each is
     away from singular ones."""
-    visits, blocked, reached = list[tuple[Array, Index]](), list[NoWay](), 0
-    for poses, lines in zip((takes, puts), ends, strict=True):
-        q, good, grips = _reaching(chain, poses, near)
-        asked, follows = _with_ends(chain, q, lines)
+    visits, blocked = list[tuple[Array, Index]](), list[NoWay]()
+    both = [_reaching(chain, poses, near) for poses in (takes, puts)]
+    ended = _with_ends(chain, [q for q, _, _ in both], ends)
+    for (q, good, grips), (asked, follows) in zip(both, ended, strict=True):
         good &= follows & (least_singular_value(chain, q) >= SINGULAR)
-        reached += int(good.any())
         margin, pair = _asked(clearance, asked, good)
         clear = margin.min(axis=0, initial=np.inf) >= 0.0
         obstacle = None if clear.any() else _obstacle(margin, pair)
@@ -123,7 +119,7 @@ def free_candidates(
     i, j = np.nonzero(first[:, None] == last)
     after, inside = nearest_in_range(chain, other[j], one[i])
     pairs = np.stack([one[i], after], axis=1)[inside]
-    return Candidates(pairs, first[i][inside], reached, blocked[0] if blocked else None)
+    return Candidates(pairs, first[i][inside], blocked[0] if blocked else None)
 
 
 def _reaching(
@@ -136,15 +132,16 @@ def _reaching(
     return *nearest_in_range(chain, np.concatenate(every), near), grips
 
 
-def _with_ends(chain: SerialChain, q: Array, lines: Sequence[Array]) -> tuple[list[Array], Truth]:
-    """Configurations (m, n) with those at the far ends of lines of the tool from there, and whether
-    the arm follows all lines (m,)."""
-    places, follows = [q], np.ones(len(q), bool)
-    for offsets in lines:
-        rows, good = tool_line(chain, q, offsets)
-        follows &= good
-        places.append(rows[:, -1])
-    return places, follows
+def _with_ends(
+    chain: SerialChain, visits: Sequence[Array], ends: Sequence[Sequence[Array]]
+) -> Iterator[tuple[list[Array], Truth]]:
+    """The configurations (m, n) of each visit with those at the far ends of its lines of the tool
+    from there, and whether the arm follows all of these lines (m,)."""
+    starts = [q for q, lines in zip(visits, ends, strict=True) for _ in lines]
+    made = iter(tool_lines(chain, starts, [offsets for lines in ends for offsets in lines]))
+    for q, lines in zip(visits, ends, strict=True):
+        rows, good = zip(*(next(made) for _ in lines), strict=True)
+        yield [q, *(row[:, -1] for row in rows)], np.logical_and.reduce(good)
 
 
 def _asked(clearance: Clearance, places: Sequence[Array], which: Truth) -> tuple[Array, Index]:

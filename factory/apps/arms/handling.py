@@ -131,7 +131,7 @@ class Handling:
     @cached_property
     def sizes(self) -> list[float]:
         """The radii of pads for which there is room on some burden [m]."""
-        return sorted({round(float(burden.pad.radius), 4) for burden in self.burdens.values()})
+        return sorted({round(float(burden.hold.pad.radius), 4) for burden in self.burdens.values()})
 
     @property
     def pad(self) -> float:
@@ -146,14 +146,15 @@ class Handling:
 
     def covered(self, label: str) -> float:
         """Radius of what a pad covers of a burden [m]."""
-        return min(self.pad, float(self.burdens[label].pad.radius))
+        return min(self.pad, float(self.burdens[label].hold.pad.radius))
 
     @cached_property
     def tip(self) -> dict[str, Array]:
         """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
         off = GAP - SUCTION_GAP
         return {
-            label: np.asarray(b.pad.at + off * b.hold.normal) for label, b in self.burdens.items()
+            label: np.asarray(b.hold.pad.at + off * b.hold.normal)
+            for label, b in self.burdens.items()
         }
 
     @cached_property

@@ -8,6 +8,8 @@ seed remains.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from factory.api import Array, Truth
@@ -187,3 +189,24 @@ def tool_line(chain: SerialChain, q: Array, offsets: Array) -> tuple[Array, Trut
         good &= there & inside & (np.abs(after - rows[-1]).max(axis=-1) < 5.0 / len(offsets))
         rows.append(after)
     return np.stack(rows, axis=1), good
+
+
+def tool_lines(
+    chain: SerialChain, starts: Sequence[Array], lines: Sequence[Array]
+) -> list[tuple[Array, Truth]]:
+    """`tool_line` for several lines, found together where they have as many places.
+
+    Args:
+        chain: the arm.
+        starts: for each line configurations at its beginning (m, n) [rad, m].
+        lines: offsets of the places of each from its beginning, which is the first (k, 3) [m].
+    """
+    rows = dict[int, tuple[Array, Truth]]()
+    for count in dict.fromkeys(map(len, lines)):
+        which = [n for n, line in enumerate(lines) if len(line) == count]
+        many = [len(starts[n]) for n in which]
+        offsets = np.repeat(np.stack([lines[n] for n in which], axis=1), many, axis=1)
+        made = tool_line(chain, np.concatenate([starts[n] for n in which]), offsets)
+        split = (np.split(each, np.cumsum(many)[:-1]) for each in made)
+        rows.update(zip(which, zip(*split, strict=True), strict=True))
+    return [rows[n] for n in range(len(lines))]

@@ -77,13 +77,17 @@ class _Search:
 
     def shorten(self, path: list[Array], rng: np.random.Generator) -> list[Array]:
         """A polyline with shortcuts at random."""
+        corners, asked = [*range(len(path))], dict[tuple[int, int], bool]()
         for _ in range(SHORTCUTS):
-            if len(path) < 3:
+            if len(corners) < 3:
                 break
-            i, j = sorted(rng.choice(len(path), 2, replace=False).tolist())
-            if j - i > 1 and self.clear(path[i], path[j]):
-                path = path[: i + 1] + path[j:]
-        return path
+            i, j = sorted(rng.choice(len(corners), 2, replace=False).tolist())
+            ends = corners[i], corners[j]
+            if j - i > 1 and ends not in asked:
+                asked[ends] = self.clear(path[ends[0]], path[ends[1]])
+            if asked.get(ends):
+                corners = corners[: i + 1] + corners[j:]
+        return [path[corner] for corner in corners]
 
 
 def line(a: Array, b: Array) -> Array:

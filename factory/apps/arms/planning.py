@@ -3,7 +3,7 @@ and places them, and its ways between these."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from math import pi
@@ -19,13 +19,13 @@ from factory.apps.arms.chain import ConvexBody
 from factory.apps.arms.circuit import candidates, circuit, free_candidates
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.holds import facing_up
-from factory.apps.arms.inverse import tool_line
+from factory.apps.arms.inverse import tool_lines
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.obstacles import feeder_name, obstacles, placed_name
 from factory.apps.arms.reach import diagnose_reach
-from factory.apps.arms.rises import Rise
+from factory.apps.arms.rises import Rise, StraightEnd
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
 from factory.floor.geometry.turning import about_vertical
@@ -64,19 +64,6 @@ class ArmTour:
     stop: float = 0.0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StraightEnd:
-    """A straight end of a way.
-
-    Attributes:
-        rows: configurations along it, from the visit (k, n) [rad, m].
-        share: of it that is not rounded, from the visit.
-    """
-
-    rows: Array
-    share: float
-
-
 class ArmPlanner:
     """Plans the legs of one arm.
 
@@ -111,16 +98,14 @@ class ArmPlanner:
         """The tours of the arm, in the order of its program. Raises RunError (Unreachable,
         NoWay)."""
         cell, visits, tours = self.cell, self._visits(), list[ArmTour]()
-        for number, label in enumerate(self.labels):
-            yaw, taken, placed = visits[number]
-            before, (_, _, left) = self.labels[number - 1], visits[number - 1]
-            out = self._line(left, cell.leaves(before), before)
-            enters = self._line(taken, cell.enters(label), label)
-            goes = self._leg(out, enters, "", before, label)
+        lines = self._lines(visits)
+        for number, (label, (yaw, _, _)) in enumerate(zip(self.labels, visits, strict=True)):
+            before, (enters, exits, into, _) = self.labels[number - 1], lines[number]
+            out = self._end(before, *lines[number - 1][3])
+            goes = self._leg(out, self._end(label, *enters), "", before, label)
             self._hold(label, yaw)
-            exits = self._line(taken, cell.exits(label), label)
-            into = self._line(placed, cell.rises(label), label)
-            brings = self._leg(exits, into, label, label, label)
+            ends = self._end(label, *exits), self._end(label, *into)
+            brings = self._leg(*ends, label, label, label)
             normal = cell.burdens[label].hold.normal
             grip = ToolGrip(cell.tip[label], yaw, cell.covered(label), normal=normal)
             tours.append(ArmTour(label, grip, goes, brings))
@@ -203,12 +188,16 @@ class ArmPlanner:
         """From the directions of the world to those of the arm's base (3, 3)."""
         return about_vertical(-self.cell.stands[self.arm].yaw)
 
+    def _rises(self, label: str) -> tuple[Rise, Rise, Rise, Rise]:
+        """How the tool comes to where it takes something and goes from there, and the same where it
+        places it."""
+        cell = self.cell
+        return cell.enters(label), cell.exits(label), cell.rises(label), cell.leaves(label)
+
     def _ends(self, label: str) -> tuple[list[Array], list[Array]]:
         """The lines of the tool where it takes something, and where it places it."""
-        cell = self.cell
-        ends = cell.enters(label), cell.exits(label), cell.rises(label), cell.leaves(label)
-        enters, exits, rises, leaves = (rise.places @ self._turn.T for rise in ends)
-        if cell.is_straight(label):  # one of them stands for all
+        enters, exits, rises, leaves = (rise.places @ self._turn.T for rise in self._rises(label))
+        if self.cell.is_straight(label):  # one of them stands for all
             return [enters], [enters]
         return [enters, exits], [rises, leaves]
 
@@ -239,7 +228,7 @@ class ArmPlanner:
             return {f"'{label}'", feeder_name(label), *self._moving}
         line = cell.lines[burden.source]
         there = {placed_name(part, line) for part in burden.parts}
-        touched = there if loaded else {placed_name(burden.held, line)}
+        touched = there if loaded else {placed_name(burden.hold.part, line)}
         return {line.name, *self._moving} - (there - touched)
 
     def _spared_under(self, label: str) -> set[str]:
@@ -260,15 +249,25 @@ class ArmPlanner:
             for part in line.rails.product.solids
         }
 
-    def _line(self, q: Array, rise: Rise, label: str) -> StraightEnd:
-        """The straight line up from a visit."""
-        length = rise.length
-        rows, good = tool_line(self.chain, q[None], rise.places @ self._turn.T)
-        if not good[0]:
-            message = f"{self.name} cannot go straight up from '{label}' by {length * 1e3:.0f} mm"
-            position = self.cell.factory.by_label[label].position
-            raise RunError(Diagnostic("Unreachable", message, position, RAILS))
-        return StraightEnd(np.asarray(rows[0]), rise.straight / length)
+    def _lines(
+        self, visits: Sequence[tuple[float, Array, Array]]
+    ) -> list[list[tuple[Rise, Array, bool]]]:
+        """For each part its straight ends, as in `_rises`, with the configurations (k, n) on them
+        from the visit, and whether the arm follows them."""
+        rises = [rise for label in self.labels for rise in self._rises(label)]
+        starts = [q[None] for _, taken, placed in visits for q in (taken, taken, placed, placed)]
+        made = tool_lines(self.chain, starts, [rise.places @ self._turn.T for rise in rises])
+        lines = [(rise, row[0], bool(good)) for rise, (row, good) in zip(rises, made, strict=True)]
+        return [lines[n : n + 4] for n in range(0, len(lines), 4)]
+
+    def _end(self, label: str, rise: Rise, rows: Array, good: bool) -> StraightEnd:
+        """The straight line from a visit. Raises RunError (Unreachable) if the arm does not follow
+        it."""
+        if good:
+            return StraightEnd(rows, rise.straight / rise.length)
+        message = f"{self.name} cannot go straight up from '{label}' by {rise.length * 1e3:.0f} mm"
+        position = self.cell.factory.by_label[label].position
+        raise RunError(Diagnostic("Unreachable", message, position, RAILS))
 
     def _leg(
         self, out: StraightEnd, into: StraightEnd, label: str, before: str, after: str

@@ -64,3 +64,16 @@ class Rise:
         aside = np.minimum(gone, before) + BEND * np.sin(bent)
         up = BEND * (1 - np.cos(bent)) + np.maximum(gone - before - BEND * pi / 2, 0.0)
         return np.asarray(aside[:, None] * self.along + up[:, None] * UP)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StraightEnd:
+    """A straight end of a way.
+
+    Attributes:
+        rows: configurations along it, from the visit (k, n) [rad, m].
+        share: of it that is not rounded, from the visit.
+    """
+
+    rows: Array
+    share: float

@@ -3,7 +3,7 @@ and of its links from each other, measured by the engine."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from xml.etree import ElementTree
@@ -23,6 +23,12 @@ OWN = 0.001
 
 FAR = 0.05
 """Distances are measured up to this [m]."""
+
+CLOSE = 1e-5
+"""Distances that differ by less may come in any order [m]."""
+
+ROWS = 64
+"""So many configurations are asked for at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,45 +159,103 @@ class Scene:
             spared: names of obstacles that do not count.
             held: whether what it holds counts.
         """
-        still = np.array([g for g in self.still if self._called(g) not in spared], int)
-        moving = [*self.links, *(self.loads.get(label, ()) if held else ())]
-        margin, pair = np.empty(len(q)), np.empty(len(q), int)
-        for row, one in enumerate(q):
-            margin[row], pair[row] = self._least(one, moving, still, label if held else "", need)
+        loads = self.loads.get(label, []) if held else []
+        pairs = [*self._own, *((g, k) for g in loads for k in self._far_links)]
+        links = np.array(pairs, int).reshape(-1, 2)
+        moving = np.array([*self.links, *loads])
+        boxes = [each for name, each in self._boxes.items() if name not in spared]
+        margin, pair = np.full(len(q), FAR - need), np.zeros(len(q), int)
+        for first in range(0, len(q), ROWS):
+            places, turns = self.poses(q[first : first + ROWS])
+            near = self._near(places, moving, boxes, need), self._near_own(places, links)
+            rows, bounds, geoms = (np.concatenate(each) for each in zip(*near, strict=True))
+            needs = np.repeat([need, OWN], [len(each[0]) for each in near])
+            order = np.lexsort((np.maximum(bounds, 0.0), rows))
+            ends = np.searchsorted(rows[order], np.arange(len(places) + 1))
+            for row in np.flatnonzero(np.diff(ends)).tolist():
+                asked = order[ends[row] : ends[row + 1]]
+                values = (each[asked].tolist() for each in (bounds, geoms, needs))
+                self.d.geom_xpos[self.moves] = places[row, self.moves]
+                self.d.geom_xmat[self.moves] = turns[row]
+                least = self._least(margin[first + row], zip(*values, strict=True))
+                margin[first + row], pair[first + row] = least
         return margin, pair
 
     def _least(
-        self, q: Array, moving: Sequence[int], still: Array, label: str, need: float
+        self, margin: float, asked: Iterable[tuple[float, tuple[int, int], float]]
     ) -> tuple[float, int]:
-        """The least margin of a configuration, and its pair."""
-        m, d = self.m, self.d
-        d.qpos[:] = q
-        mujoco.mj_kinematics(m, d)
-        best, pair = FAR, 0
-        place, bound = d.geom_xpos, m.geom_rbound
-        low = place[still] - m.geom_size[still]
-        high = place[still] + m.geom_size[still]
-        for one in moving:
-            near = np.clip(place[one], low, high) - place[one]
-            gap = np.sqrt((near * near).sum(axis=1)) - bound[one]
-            for other in still[gap < best].tolist():
-                away = mujoco.mj_geomDistance(m, d, one, other, best, None)
-                if away < best:
-                    best, pair = away, one * m.ngeom + other
-        pairs = self._own
-        if label:
-            pairs = [*pairs, *((g, k) for g in self.loads[label] for k in self._far_links)]
-        best -= need
-        for one, other in pairs:
-            apart = place[one] - place[other]
-            if float(apart @ apart) ** 0.5 - bound[one] - bound[other] - OWN < best:
-                away = mujoco.mj_geomDistance(m, d, one, other, FAR, None) - OWN
-                if away < best:
-                    best, pair = away, one * m.ngeom + other
-        return float(best), int(pair)
+        """The least margin below one, and its pair, of pairs by lower bounds on their margins, with
+        the clearance that each needs."""
+        pair = 0
+        for bound, (one, other), need in asked:
+            if bound >= margin:
+                continue
+            away = mujoco.mj_geomDistance(self.m, self.d, one, other, FAR, None) - need
+            if away < margin:
+                margin, pair = away, one * self.m.ngeom + other
+        return margin, pair
+
+    def poses(self, q: Array) -> tuple[Array, Array]:
+        """The middles of geoms in configurations (m, n): (m, geoms, 3) [m], and the orientations of
+        those that are not still (m, k, 9)."""
+        d, moves, places = self.d, self.moves, np.tile(self.m.geom_pos, (len(q), 1, 1))
+        turns = np.empty((len(q), len(moves), 9))
+        for row, one in enumerate(q):
+            d.qpos[:] = one
+            mujoco.mj_kinematics(self.m, d)
+            places[row, moves], turns[row] = d.geom_xpos[moves], d.geom_xmat[moves]
+        return places, turns
+
+    @cached_property
+    def moves(self) -> Index:
+        """The geoms of the arm, and what it may hold."""
+        return np.setdiff1d(np.arange(self.m.ngeom), self.still)
+
+    @cached_property
+    def _boxes(self) -> dict[str, Index]:
+        """The geoms of what stands, by its name."""
+        boxes = dict[str, list[int]]()
+        for geom in self.still:
+            boxes.setdefault(self._called(geom), []).append(geom)
+        return {name: np.array(each) for name, each in boxes.items()}
+
+    def _near(
+        self, places: Array, moving: Index, boxes: Sequence[Index], need: float
+    ) -> tuple[Index, Array, Index]:
+        """Pairs of what moves and of a box of which one is nearest, if any is nearer than FAR: row
+        of `places` (k,), a lower bound on the margin [m], and the geoms (k, 2). First the boxes of
+        one name are taken together."""
+        m, many = self.m, np.array([len(each) for each in boxes], int)
+        low, high = m.geom_pos - m.geom_size, m.geom_pos + m.geom_size
+        hull = [(low[each].min(axis=0), high[each].max(axis=0)) for each in boxes]
+        ends = np.array(hull).reshape(-1, 2, 3)
+        away = _away(places[:, moving, None], ends[:, 0], ends[:, 1])
+        row, one, name = np.nonzero(away - m.geom_rbound[moving, None] < FAR)
+        count, every = many[name], np.array([g for each in boxes for g in each], int)
+        number = np.arange(count.sum()) + np.repeat((many.cumsum() - many)[name], count)
+        other = every[number - np.repeat(count.cumsum() - count, count)]
+        row, one = np.repeat(row, count), np.repeat(moving[one], count)
+        away = _away(places[row, one], low[other], high[other])
+        most, bound = np.full(len(places), FAR), away - m.geom_rbound[one]
+        np.minimum.at(most, row, away + CLOSE)  # no geom is farther than its middle
+        kept = bound < most[row]
+        return row[kept], bound[kept] - need, np.stack([one, other], axis=1)[kept]
+
+    def _near_own(self, places: Array, pairs: Index) -> tuple[Index, Array, Index]:
+        """The same of pairs of the arm's own (p, 2)."""
+        off = np.linalg.norm(places[:, pairs[:, 0]] - places[:, pairs[:, 1]], axis=2)
+        bound = off - self.m.geom_rbound[pairs].sum(axis=1) - OWN
+        row, number = np.nonzero(bound < FAR)
+        return row, bound[row, number], pairs[number]
 
     @cached_property
     def _far_links(self) -> list[int]:
         """The links that a payload may come to: with two joints or more between."""
         last = max(self._depth[g] for g in self.links)
         return [g for g in (*self.base, *self.links) if self._depth[g] <= last - 2]
+
+
+def _away(place: Array, low: Array, high: Array) -> Array:
+    """Distances (...) of places from boxes (..., 3) [m]."""
+    off = np.maximum(np.maximum(low - place, place - high), 0.0)
+    return np.asarray(np.sqrt((off * off).sum(axis=-1)))

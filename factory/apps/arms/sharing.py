@@ -54,20 +54,18 @@ class SweptArm:
         label: str = "",
     ) -> SweptArm:
         """Those of an arm on a way, with what it carries at its tool, a part perhaps."""
-        m, d = scene.m, scene.d
+        m = scene.m
         geoms = [*scene.links, *scene.loads.get(label, ())]
         round_ = ~np.isin(m.geom_type[geoms], LONG)
         long = np.where(round_, 0.0, m.geom_size[geoms, 1])
         radius = np.where(round_, m.geom_rbound[geoms], m.geom_size[geoms, 0])
-        x, rows = np.linspace(0.0, way.length, STEPS + 1), list[Array]()
+        x = np.linspace(0.0, way.length, STEPS + 1)
         steps = travels(chain, way, x, [*chain.bodies, *carried]).max(axis=1)
-        for q in way.at(x)[0]:
-            d.qpos[:] = q
-            mujoco.mj_kinematics(m, d)
-            axis = d.geom_xmat[geoms].reshape(-1, 3, 3)[:, :, 2] * long[:, None]
-            middle = d.geom_xpos[geoms]
-            rows.append(np.stack([middle - axis, middle + axis], axis=1))
-        return cls(np.array(rows), radius, np.append(0.0, np.cumsum(steps)))
+        places, turns = scene.poses(way.at(x)[0])
+        turns = turns[:, np.searchsorted(scene.moves, geoms)].reshape(len(x), -1, 3, 3)
+        middle, axis = places[:, geoms], turns[..., 2] * long[:, None]
+        ends = np.stack([middle - axis, middle + axis], axis=2)
+        return cls(ends, radius, np.append(0.0, np.cumsum(steps)))
 
     @property
     def backwards(self) -> SweptArm:

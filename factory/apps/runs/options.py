@@ -36,12 +36,13 @@ APART = (
         for arms in ("--arm", "[arms]")
         for options, reason in (
             (
-                ("--relay", "--cycle", "--robots", "--parallel", "--platen", "[lines]", "[tees]"),
+                ("--relay", "--robots", "--parallel", "--platen", "[lines]", "[tees]"),
                 "a cell has one carrier and its arms",
             ),
             (("--floor",), "a cell is as large as its arm"),
         )
     ),
+    ("[arms]", ("--cycle",), "the table says how many arms there are"),
 )
 """Options that exclude others, with the reason. All other pairs can be combined; of a product,
 --relay goes with none of a mix, and with no plan whose robots have several tours (`Project`)."""

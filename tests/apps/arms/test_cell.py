@@ -10,17 +10,20 @@ import mujoco
 import numpy as np
 import pytest
 
-from factory.api import Diagnostic, Position, RunError
+from factory.api import Diagnostic, InputError, Position, RunError, Settings
+from factory.apps.arms import few_arms
 from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.cell_arm import CellArm
-from factory.apps.arms.ground import CellGround, with_arms
+from factory.apps.arms.ground import CellGround, CellProject, with_arms
 from factory.apps.arms.model import ArmModel
 from factory.apps.live.interventions import Interventions
 from factory.apps.log.cell_table import cell_in
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.layout.coordinating import with_machines
+from factory.floor.layout.request import Ground
 from factory.pipeline import Project, all_templates, read
 from factory.theory.lang import read_pag
 from factory.theory.nets.verify import verify
@@ -280,6 +283,43 @@ def test_an_arm_is_as_its_table_says(tmp_path: Path, own: Path) -> None:
     assert isinstance(again.ground, CellGround) and again.ground.arms == made.ground.arms
     assert again.ground.model is not None
     assert (again.ground.model.chain.limits.speed == chain.limits.speed).all()
+
+
+@pytest.mark.parametrize(
+    ("takes", "cycle", "arms", "warned"),
+    [
+        ((9.0, 5.0), 9.0, 1, False),
+        ((9.0, 5.0), 8.0, 2, False),
+        ((9.0, 5.0), 4.0, 2, True),
+        ((9.0, 9.5), 4.0, 1, True),
+        ((None, 5.0), 6.0, 2, False),
+        ((9.0, None), 6.0, 1, True),
+    ],
+)
+def test_a_cycle_time_asks_for_few_arms(
+    takes: tuple[float | None, ...],
+    cycle: float,
+    arms: int,
+    warned: bool,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two only where one is too slow, and no slower ones; if either has no layout, the other."""
+
+    def paced(made: CellProject, _: Settings) -> tuple[CycleTime, tuple[()]]:
+        seconds = takes[len(brings(made)) - 1]
+        if seconds is None:
+            raise RunError(Diagnostic("Layout", "no room"))
+        return CycleTime(seconds, ""), ()
+
+    monkeypatch.setattr(CellProject, "layout", property(lambda made: made))
+    monkeypatch.setattr(few_arms, "pace", paced)
+    warnings = list[Diagnostic]()
+    product_of_it = read(product(tmp_path, BEAM), ground=Ground(cycle=cycle))
+    made = few_arms.with_few_arms(product_of_it, "six", cycle, warnings.append)
+    assert len(brings(made)) == arms and [d.code for d in warnings] == ["SlowCycle"] * warned
+    with pytest.raises(InputError, match="the number is looked for"):
+        few_arms.with_few_arms(product_of_it, "six=2", cycle, warnings.append)
 
 
 def test_the_plan_of_a_cell_makes_the_same(tmp_path: Path, run: Terminal) -> None:

@@ -188,7 +188,7 @@ def test_free_candidates_pair_any_branches() -> None:
         assert np.abs(at - place[free.grips]).max() < 1e-8
         assert np.abs(now - turn[free.grips]).max() < 1e-8
     none = free_candidates(chain, takes, puts, ball(chain, RIGHT, 0.3), near, UP)
-    assert len(none.pairs) == 0 and none.reached == 2 and none.blocked is not None
+    assert len(none.pairs) == 0 and none.blocked is not None
 
 
 def test_the_circuit_is_the_best_of_all() -> None:
@@ -272,11 +272,11 @@ def test_a_part_that_is_held_turned_is_turned() -> None:
 
 
 def test_margins_are_those_of_all_pairs() -> None:
-    """Against the engine's distances of every pair, none left out."""
+    """Against the engine's distances of every pair, of which several boxes have one name."""
     rng = np.random.default_rng(7)
     boxes = tuple(
         StandingBox(
-            f"box {k}",
+            f"box {k % 5}",
             tuple((low := rng.uniform(-0.8, 0.6, 3)).tolist()),
             tuple((low + size).tolist()),
         )
@@ -284,7 +284,7 @@ def test_margins_are_those_of_all_pairs() -> None:
     )
     scene, need = scene_of(Stand((0.0, 0.0, 0.1), 0.0, PAD_RADIUS), boxes), 0.01
     chain: SerialChain = shipped("six")
-    q, spared = configurations(chain, 60, 8), {"box 3"}
+    q, spared = configurations(chain, 70, 8), {"box 3"}
     seen = 0
     for label in ("", "part"):
         margin, pair = scene.margins(q, label, need, spared)
