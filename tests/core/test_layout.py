@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from factory.floor.layout.clearance import certify
 from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.dimensions import ARMS, SIDE, Clearance
 from factory.floor.layout.embedding import lay_out
+from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.footprint import footprint
 from factory.floor.layout.hands import in_the_way
 from factory.floor.layout.hands.choosing import Hands
@@ -34,6 +36,10 @@ from factory.floor.layout.hands.outermost import _on_edges
 from factory.floor.layout.hands.places import Loads, places
 from factory.floor.layout.hands.surfaces import hit
 from factory.floor.layout.layout import Layout
+from factory.floor.layout.machines import presences
+from factory.floor.layout.nearness import distances
+from factory.floor.layout.outline import Choice, Guest, outlined
+from factory.floor.layout.presence import ACROSS
 from factory.floor.layout.shapes import symmetric_shapes
 from factory.pipeline import all_templates
 from factory.support.errors import InputError
@@ -271,6 +277,29 @@ def test_a_corridor_beside_a_robot_is_left_only_if_it_is_asked_for() -> None:
     (shape, *_), c = symmetric_shapes(layout.factory, layout.payloads, Clearance()), Clearance()
     made = [footprint(layout.factory, 0, shape, c, *asked) for asked in ((), (False,), (True,))]
     assert [one.corridor for one in made] == [False, False, True]
+
+
+def test_guests_are_seen_apart_unless_they_are_to_be_one_box() -> None:
+    layout = paper_layout()
+    shape, *_ = symmetric_shapes(layout.factory, layout.payloads, Clearance())
+    own = footprint(layout.factory, 0, shape, Clearance())
+    piles = [own.placed(own.stops[0], 0.0, {}, ())]
+    alone = outlined(own, piles, (), Choice())
+    guests = [Guest(n, alone, side, 0.2) for n, side in enumerate((-1, 1))]
+    apart, box = (
+        outlined(own, piles, guests, Choice()),
+        outlined(own, piles, guests, Choice(), True),
+    )
+    assert [len(blocks) for blocks in apart.blocks] == [3, 3, 3]
+    assert [len(blocks) for blocks in box.blocks] == [1, 1, 1]
+
+
+def test_layers_keep_apart_unless_one_bears_what_it_hands_over() -> None:
+    layout = paper_layout()
+    sides = list(presences(layout, coordinated(layout), {}))
+    pairs = [(one, other) for one, other in combinations(sides, 2) if one.is_apart(other)]
+    found = {(a.bears or b.bears, distances(a, b, 0.02)[2]) for a, b in pairs}
+    assert found == {(False, ACROSS), (True, 0.0)}
 
 
 def test_a_pin_and_a_wait_cost_and_a_wait_no_more_than_a_long_one() -> None:
