@@ -154,6 +154,7 @@ def test_certificate_entries_are_inherited_and_forged_ones_refused(truck_to_van:
     assert "does not hold" in next(refuted(mine, faulty, new, found.pairing))
 
 
+@pytest.mark.slow
 def test_an_added_part_moves_few() -> None:
     """The other robots of a floor, or the new one's own branch; hands stay to the micrometre."""
     old = project(example("gearbox"))
