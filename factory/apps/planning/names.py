@@ -95,27 +95,28 @@ PLACES = re.compile(
 """Nouns for parts that a screw may be named after, with its size: `cover_M3x10`."""
 
 OTHERS = re.compile(
-    PLACES.pattern + r"|\w*(?:nuts?|washers?|muttern?|scheiben?|zahnrad|bushing|bearing|buchse|"
-    r"huelse|hulse|drivers?|dreher|zieher|stopfen|nieten?|rivets?|federring|sicherungsring|"
-    r"sprengring|einsatz|einsaetze)|\w*(?<!gewinde)stifte?|rings?|pins?|dowels?|inserts?|standoffs?|spacers?|"
-    r"sleeves?|circlips?|clips?|keys?|holes?|loch|circles?|patterns?|terminals?|wrench|knobs?|"
-    r"handles?|wheels?|gears?|pinions?|shafts?|axles?|plugs?|valves?|pistons?|rollers?|pulleys?|"
-    r"springs?|magnets?|welle|achse|griff|knopf|ventil|kolben|rolle|feder|lager|ecrous?|rondelles?|"
-    r"goupilles?|tuercas?|arandelas?|pasador(?:es)?|dad[oi]|rondell[ae]|spin[ae]|antenn[ae]|"
-    r"propeller"
+    PLACES.pattern + r"|\w*(?:nuts?|washers?|muttern?|scheiben?|zahnrad|bush(?:es|ings?)?|"
+    r"bearing|buchse|huelse|hulse|drivers?|dreher|zieher|stopfen|nieten?|rivets?|federring|"
+    r"sicherungsring|sprengring|einsatz|einsaetze)|\w*(?<!gewinde)stifte?|rings?|pins?|dowels?|"
+    r"inserts?|standoffs?|spacers?|sleeves?|circlips?|clips?|keys?|holes?|loch|circles?|"
+    r"patterns?|terminals?|wrench|knobs?|handles?|wheels?|gears?|pinions?|shafts?|axles?|"
+    r"plugs?|valves?|pistons?|rollers?|pulleys?|springs?|magnets?|welle|achse|griff|knopf|"
+    r"ventil|kolben|rolle|feder|lager|ecrous?|rondelles?|goupilles?|tuercas?|arandelas?|"
+    r"pasador(?:es)?|dad[oi]|rondell[ae]|spin[ae]|antenn[ae]|propeller"
 )
 """Nouns for other parts, some of which look like screws."""
 
 MORE = _words(
     "left right top bottom upper lower front rear back inner outer middle mid center centre side"
     " corner north south east west links rechts oben unten vorne hinten mitte innen aussen first"
-    " second third last short long kurz lang small large big klein gross thin thick lh rh copy"
-    " kopie instance inst no nr num number part body solid component comp mesh object obj stl"
-    " steel stainless inox zinc brass messing stahl black schwarz silver nylon galvanized"
-    " verzinkt hex hexagon hexagonal torx allen inbus phillips pozi pozidriv slotted recessed tx"
-    " pz ph sw pan flat button cheese countersunk csk senkkopf zylinderkopf linsenkopf sechskant"
-    " innensechskant mm inch unc unf grade class type typ standard std din iso en bs chc fhc thc"
-    " jis gost uni ansi asme a b c d e f g h i j k l m n o p q r s t u v w x y z"
+    " second third last drive driven driving idle idler short long kurz lang small large big klein"
+    " gross thin thick lh rh copy kopie instance inst no nr num number part body solid component"
+    " comp mesh object obj stl steel stainless inox zinc brass messing stahl black schwarz silver"
+    " nylon galvanized verzinkt hex hexagon hexagonal torx allen inbus phillips pozi pozidriv"
+    " slotted recessed tx pz ph sw pan flat button cheese countersunk csk senkkopf zylinderkopf"
+    " linsenkopf sechskant innensechskant mm inch unc unf grade class type typ standard std din"
+    " iso en bs chc fhc thc jis gost uni ansi asme a b c d e f g h i j k l m n o p q r s t u v w x"
+    " y z"
 )
 """Words that say more of what a noun names."""
 

@@ -92,6 +92,7 @@ def test_the_last_noun_and_the_number_of_a_standard_say_what_a_part_is() -> None
     assert [name for name in SCREWS.split() if says(name) != Says.SCREW] == []
     wrong = [name for name in OTHERS.split() if says(name) not in (Says.OTHER, Says.NOTHING)]
     assert wrong == []
+    assert {says(name) for name in ("gear_drive", "gear_idler_1", "bush_drive")} == {Says.OTHER}
     assert [name for name in PERHAPS.split() if says(name) != Says.PERHAPS] == []
 
 
