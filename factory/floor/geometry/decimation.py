@@ -33,15 +33,15 @@ class Coarse:
     far: float = 0.0
 
 
-def decimated(body: Any, within: float) -> Coarse:
-    """The body with no more than ENOUGH triangles or, if there is none `within` a distance [m] of
+def decimated(body: Any, within: float, enough: int = ENOUGH) -> Coarse:
+    """The body with no more than `enough` triangles or, if there is none `within` a distance [m] of
     it, the one with fewest triangles."""
-    if body.num_tri() <= ENOUGH:
+    if body.num_tri() <= enough:
         return Coarse(body)
     tried = []
     for share in STEPS:
         tried.append(body.simplify(within / share))
-        if tried[-1].num_tri() <= ENOUGH:
+        if tried[-1].num_tri() <= enough:
             break
     for one in tried[::-1]:
         if one.num_tri() < body.num_tri() and one.volume() > 0:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from factory.floor.geometry.alike import PartShape, motion_between, moved, shape_of
-from factory.floor.geometry.decimation import ENOUGH, decimated
+from factory.floor.geometry.decimation import decimated
 from factory.floor.geometry.meshes import Mesh, is_closed, is_flat, normals_of, volume_of
 from factory.floor.geometry.overlap import bounded, merged
 from factory.floor.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
@@ -53,6 +53,9 @@ intersects itself has a third of the triangles."""
 WITHIN = 1e-4, 0.05
 """A mesh may be decimated before it is decomposed within the first distance [m], and the second
 share of the deviation that CoACD allows."""
+
+ENOUGH = 600
+"""A mesh of so many triangles is decomposed as it is."""
 
 SAME_AREA, EXACT = 1e-4, 2e-6
 """Two shapes may be equal if their areas differ by less than the first share, and are if no vertex
@@ -226,7 +229,7 @@ def _coarse(mesh: Mesh, threshold: float) -> tuple[Array, Indices]:
     if body is None:
         return mesh.vertices, mesh.faces
     allowed = threshold * float(np.ptp(mesh.vertices, axis=0).max()) / 2
-    coarse = decimated(body, min(WITHIN[0], WITHIN[1] * allowed))
+    coarse = decimated(body, min(WITHIN[0], WITHIN[1] * allowed), ENOUGH)
     return merged(coarse.body.to_mesh64()) if coarse.far else (mesh.vertices, mesh.faces)
 
 
