@@ -25,6 +25,7 @@ REPORT = Report(
         "movers",
         "few_robots",
         "states",
+        "firings",
         "proving",
         "sweeping",
         "rendering",
