@@ -99,7 +99,7 @@ def section(results: dict[str, Any]) -> str:
             f"{row['theirs']['s']:.3g}",
             f"{row['ours']['s']:.3g}",
             f"{row['ratio']:.1f}",
-            f"{row['off_s']:.0e} s",
+            f"{row['off_s']:.2g} s",
         )
         for row in results["rows"]
     ]
