@@ -15,7 +15,7 @@ __version__ = "0.1.0"
 
 EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {
-        "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
+        "decompose": (("coacd",), "meshes of free form collide as convex pieces"),
         "live": (("websockets",), "`view`, in the browser"),
         "opcua": (("asyncua",), "`plant`, for a PLC"),
         "gym": (("gymnasium",), "`factory.env`, for learning"),

@@ -246,7 +246,7 @@ def test_the_real_library_gives_the_same_bodies_again(tmp_path: Path, cache: Pat
     other = trimesh.creation.annulus(0.02, 0.1, 0.05, sections=10)
     found = []
     for mesh in (tube, other, tube):
-        found.append(decomposition._run_coacd(Mesh("m", mesh.vertices, mesh.faces)))
+        found.append(decomposition._by_coacd(Mesh("m", mesh.vertices, mesh.faces)))
     assert all(np.array_equal(a, b) for a, b in zip(found[0], found[2], strict=True))
 
 
@@ -256,11 +256,11 @@ def test_the_real_library_starts_no_threads() -> None:
     pytest.importorskip("coacd")
     tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=16)
     mesh, found = Mesh("m", tube.vertices, tube.faces), list[str]()
-    decomposition._run_coacd(mesh)
+    decomposition._by_coacd(mesh)
     before = os.listdir("/proc/self/task")
 
     def do() -> None:
-        decomposition._run_coacd(mesh)
+        decomposition._by_coacd(mesh)
         found.extend(os.listdir("/proc/self/task"))
 
     thread = Thread(target=do)

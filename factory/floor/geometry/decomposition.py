@@ -3,15 +3,17 @@
 A mesh that is open is represented by its hull. A mesh of several closed convex bodies (a plate with
 a hole, written as wedges that touch) is exactly these bodies. Other closed meshes are decomposed
 body by body. A body that has a hole through it, or that another part stands in, is decomposed
-exactly if it is a body of prisms (`prisms`). Such a body, and any that fills less than 98 % of its
-hull, is otherwise decomposed by CoACD, if that is installed (the extra `decompose`); else its hull
-is used. CoACD decomposes a body in the frame of its own sides, so the result does not depend on its
-orientation. A mesh of many triangles is decimated first. Results are cached, and reused for the
-same shape in any place.
+exactly if it is a body of few prisms (`prisms`). Such a body, and any that fills less than 98 % of
+its hull, is otherwise decomposed into prisms that are a little larger (`slabs`) if most of its
+surface is parallel or perpendicular to an axis, else by CoACD, if that is installed (the extra
+`decompose`); else its hull is used. CoACD decomposes a body in the frame of its own sides, so the
+result does not depend on its orientation. A mesh of many triangles is decimated first. Results are
+cached, and reused for the same shape in any place.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
 from typing import Any
@@ -24,6 +26,7 @@ from factory.floor.geometry.meshes import Mesh, is_closed, is_flat, normals_of, 
 from factory.floor.geometry.overlap import bounded, merged
 from factory.floor.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
 from factory.floor.geometry.prisms import prisms
+from factory.floor.geometry.slabs import SETTINGS, slabs
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
@@ -37,7 +40,7 @@ FULL = 0.98
 hole through it, or another part stands in it."""
 
 CONCAVITY, SLENDER = (0.02, 0.05), 0.1
-"""Bounds on the deviation that CoACD allows (its `threshold`), in units of about half the longest
+"""Bounds on the deviation that is allowed (CoACD's `threshold`), in units of about half the longest
 edge of the mesh's box, and the bound relative to the middle edge."""
 
 PARAMETERS = {
@@ -52,7 +55,7 @@ intersects itself has a third of the triangles."""
 
 WITHIN = 1e-4, 0.05
 """A mesh may be decimated before it is decomposed within the first distance [m], and the second
-share of the deviation that CoACD allows."""
+share of the deviation that is allowed."""
 
 ENOUGH = 600
 """A mesh of so many triangles is decomposed as it is."""
@@ -64,6 +67,9 @@ is off by more than the second share of the size."""
 ALONG, LEVEL = 0.1, 1e-6
 """A body is aligned with the axes of its file if the first share of its surface is; a side is if
 the cosine of its normal and an axis differs from 1 by less than the second."""
+
+Decompose = Callable[[Mesh, float], tuple[Array, ...]]
+"""A method: the convex bodies of a mesh at a threshold; empty if it has none."""
 
 AS_DRAWN = np.eye(3)
 """The axes of a file."""
@@ -104,7 +110,7 @@ def _pieces(body: Mesh, stood_in: bool) -> tuple[Array, ...]:
     if not _fills(body, 1 - FLATNESS):
         is_entered = stood_in or has_hole(body)
         pieces = prisms(body.vertices, body.faces) if is_entered else ()
-        if not pieces and can_decompose() and (is_entered or not _fills(body, FULL)):
+        if not pieces and (is_entered or not _fills(body, FULL)):
             pieces = _decomposed(body)
         pieces = tuple(piece for piece in pieces if not is_flat(piece))
         return pieces or (body.vertices,)
@@ -136,19 +142,30 @@ def _fills(mesh: Mesh, share: float) -> bool:
 
 
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
-    """The bodies that CoACD makes of a mesh, or has made before (from the cache); the mesh itself
-    if CoACD fails."""
+    """The convex bodies that a mesh nearly is, from the cache if they were computed before; the
+    mesh itself if there are none."""
     shape = shape_of(mesh.vertices, mesh.faces)
     pieces = _kept(shape)
     if pieces is None:
-        axes = own_axes(mesh)
-        turned = replace(mesh, vertices=mesh.vertices @ axes.T) if axes is not AS_DRAWN else mesh
-        pieces = _run_coacd(turned)
-        if axes is not AS_DRAWN:
-            pieces = tuple(piece @ axes for piece in pieces)
+        pieces = _finely(mesh, _by_slabs)
+        if not pieces and can_decompose():
+            pieces = _by_coacd(mesh)
         arrays = {"vertices": shape.vertices, "faces": shape.faces, **packed(pieces)}
         store_arrays(FOLDER, _names(shape)[0], arrays)
     return pieces or (mesh.vertices,)
+
+
+def _by_slabs(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
+    return slabs(mesh.vertices, mesh.faces, *_tolerances(mesh, threshold))
+
+
+def _by_coacd(mesh: Mesh) -> tuple[Array, ...]:
+    """The bodies that CoACD makes of a mesh in its own frame."""
+    axes = own_axes(mesh)
+    if axes is AS_DRAWN:
+        return _finely(mesh, _cut)
+    turned = replace(mesh, vertices=mesh.vertices @ axes.T)
+    return tuple(piece @ axes for piece in _finely(turned, _cut))
 
 
 def _names(shape: PartShape) -> tuple[str, ...]:
@@ -156,7 +173,7 @@ def _names(shape: PartShape) -> tuple[str, ...]:
     the place of the shape, except for rounding of its area."""
     sizes = len(shape.vertices), len(shape.faces)
     step = np.log(shape.surface[0]) / SAME_AREA
-    bounds = CONCAVITY, SLENDER, SLIVER, WITHIN, ENOUGH
+    bounds = CONCAVITY, SLENDER, SLIVER, WITHIN, ENOUGH, SETTINGS
     settings = release("coacd"), sorted(PARAMETERS.items()), bounds, sizes
     numbers = dict.fromkeys(int(np.floor(step + off)) for off in (0.0, -0.01, 0.01))
     return tuple(digest(*settings, number) for number in numbers)
@@ -213,13 +230,19 @@ def _largest(normals: Array, areas: Array) -> Array:
     return np.asarray(mean / np.linalg.norm(mean))
 
 
-def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
-    """The bodies that CoACD makes of a mesh, without slivers; empty if it fails. If the result
-    would be one body, as of a plate with a shallow groove, the finest threshold is used."""
+def _finely(mesh: Mesh, decompose: Decompose) -> tuple[Array, ...]:
+    """What a method makes of a mesh. If that would be one body, as of a plate with a shallow
+    groove, the finest threshold is used."""
     _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
     coarse, least = float(np.clip(SLENDER * middle / longest, *CONCAVITY)), CONCAVITY[0]
-    pieces = _cut(mesh, coarse)
-    return _cut(mesh, least) if len(pieces) == 1 and least < coarse else pieces
+    pieces = decompose(mesh, coarse)
+    return decompose(mesh, least) if len(pieces) == 1 and least < coarse else pieces
+
+
+def _tolerances(mesh: Mesh, threshold: float) -> tuple[float, float]:
+    """How far pieces may be outside a mesh, and by how much it may be simplified before [m]."""
+    allowed = threshold * float(np.ptp(mesh.vertices, axis=0).max()) / 2
+    return allowed, min(WITHIN[0], WITHIN[1] * allowed)
 
 
 def _coarse(mesh: Mesh, threshold: float) -> tuple[Array, Indices]:
@@ -228,12 +251,12 @@ def _coarse(mesh: Mesh, threshold: float) -> tuple[Array, Indices]:
     body = bounded(mesh.vertices, mesh.faces) if len(mesh.faces) > ENOUGH else None
     if body is None:
         return mesh.vertices, mesh.faces
-    allowed = threshold * float(np.ptp(mesh.vertices, axis=0).max()) / 2
-    coarse = decimated(body, min(WITHIN[0], WITHIN[1] * allowed), ENOUGH)
+    coarse = decimated(body, _tolerances(mesh, threshold)[1], ENOUGH)
     return merged(coarse.body.to_mesh64()) if coarse.far else (mesh.vertices, mesh.faces)
 
 
 def _cut(mesh: Mesh, threshold: float) -> tuple[Array, ...]:
+    """The bodies that CoACD makes of a mesh, without slivers; empty if it fails."""
     import trimesh
 
     try:

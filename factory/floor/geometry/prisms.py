@@ -45,7 +45,7 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
     """The corners (n, 3) of convex prisms that a closed mesh consists of; empty if it is no body of
     prisms, or of more than MOST_PIECES."""
     volume, size = volume_of(vertices, faces), float(np.ptp(vertices, axis=0).max())
-    for frame in _frames(vertices, faces):
+    for frame in frames(vertices, faces):
         placed = vertices @ frame.T / size
         levels = _levels(placed, faces)
         if len(levels) < 2:
@@ -58,12 +58,12 @@ def prisms(vertices: Array, faces: Indices) -> tuple[Array, ...]:
             few = np.cumsum(volumes[order]) <= FEW * volume
             slight = (thick < min(THIN[0], THIN[1] * size)) & (_open(stack) < OPEN)
             thin = {*order[few & slight[order]].tolist()}
-            kept = (prism for number, prism in enumerate(stack) if number not in thin)
-            return tuple(_prism(*prism) @ frame * size for prism in kept)
+            kept = (each for number, each in enumerate(stack) if number not in thin)
+            return tuple(prism(*each) @ frame * size for each in kept)
     return ()
 
 
-def _frames(vertices: Array, faces: Indices) -> Iterator[Array]:
+def frames(vertices: Array, faces: Indices) -> Iterator[Array]:
     """Frames (3, 3), axes as rows, the last of which is normal to one of the largest faces."""
     normals = normals_of(vertices, faces)
     areas = np.linalg.norm(normals, axis=1)
@@ -122,12 +122,12 @@ def _convex(section: Any) -> list[Array]:
         return []
     points = np.concatenate(contours)
     triangles = triangulate(contours).tolist()
-    return [points[list(loop)] for loop in _joined(points, [tuple(t) for t in triangles])]
+    return [points[list(loop)] for loop in joined_loops(points, [tuple(t) for t in triangles])]
 
 
-def _joined(points: Array, loops: list[Loop]) -> list[Loop]:
+def joined_loops(points: Array, loops: list[Loop]) -> list[Loop]:
     """Convex polygons, joined across common sides as far as the results are convex."""
-    owner = {side: number for number, loop in enumerate(loops) for side in _sides(loop)}
+    owner = {side: number for number, loop in enumerate(loops) for side in sides_of(loop)}
     common = [(u, v) for u, v in owner if u < v and (v, u) in owner]
     common.sort(key=lambda side: -float(np.linalg.norm(points[side[0]] - points[side[1]])))
     for u, v in common:
@@ -138,11 +138,11 @@ def _joined(points: Array, loops: list[Loop]) -> list[Loop]:
         at_u = _turns_left(points, first[-2], u, second[1])
         if at_u and _turns_left(points, second[-2], v, first[1]):
             loops[one], loops[other] = first[:-1] + second[:-1], ()
-            owner.update(dict.fromkeys(_sides(loops[one]), one))
+            owner.update(dict.fromkeys(sides_of(loops[one]), one))
     return [loop for loop in loops if loop]
 
 
-def _sides(loop: Loop) -> list[tuple[int, int]]:
+def sides_of(loop: Loop) -> list[tuple[int, int]]:
     return [*zip(loop, loop[1:] + loop[:1], strict=True)]
 
 
@@ -184,6 +184,6 @@ def _open(stack: Sequence[tuple[Array, float, float]]) -> Array:
     return np.array(shares)
 
 
-def _prism(base: Array, low: float, high: float) -> Array:
+def prism(base: Array, low: float, high: float) -> Array:
     ends = np.repeat([low, high], len(base))
     return np.column_stack([np.concatenate([base, base]), ends])
