@@ -44,3 +44,12 @@ def test_prisms_are_nearly_the_body(seed: int) -> None:
 def test_a_body_without_an_axis_is_left_to_others() -> None:
     ball = merged(Manifold.sphere(0.05, 64).to_mesh64())
     assert slabs(*ball, ALLOWED, WITHIN) == ()
+
+
+def test_narrow_holes_are_closed_and_many_wide_ones_are_left_to_others() -> None:
+    plate = Manifold.cube((0.1, 0.1, 0.004), True)
+    places = [(x, y, 0.0) for x in np.linspace(-0.045, 0.045, 15) for y in (-0.02, 0.0, 0.02)]
+    for radius, count in ((ALLOWED / 2.1, 1), (ALLOWED, 0)):
+        hole = Manifold.cylinder(0.1, radius, -1.0, 48, True)
+        body = plate - Manifold.compose([hole.translate(at) for at in places])
+        assert len(slabs(*merged(body.to_mesh64()), ALLOWED, 1e-6)) == count

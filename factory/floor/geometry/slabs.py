@@ -28,8 +28,8 @@ SHARE = 0.9
 """A body is decomposed so if at least this share of its surface is parallel or perpendicular to an
 axis."""
 
-MOST = 160
-"""The most prisms of a body."""
+MOST, CORNERS = 160, 1500
+"""The most prisms of a body, and corners of a projection: merging takes their square."""
 
 LEVEL, INSIDE = 1e-5, 1e-3
 """Faces of one height differ by no more than the first share of the body's size; a slab is measured
@@ -39,7 +39,7 @@ ALIKE = 0.25
 """Neighbouring slabs are joined if their projections are off by less than this share of what is
 allowed."""
 
-SETTINGS = SHARE, MOST, LEVEL, INSIDE, ALIKE
+SETTINGS = SHARE, MOST, CORNERS, LEVEL, INSIDE, ALIKE
 """What the prisms of a mesh depend on."""
 
 Slab = tuple[float, float, Any]
@@ -48,7 +48,7 @@ Slab = tuple[float, float, Any]
 
 def slabs(vertices: Array, faces: Indices, allowed: float, within: float) -> tuple[Array, ...]:
     """The corners (n, 3) of convex prisms that together are nearly a closed mesh; empty if too
-    little of its surface is parallel or perpendicular to an axis, or there would be more than MOST.
+    little of its surface is parallel or perpendicular to an axis, or the body has too many holes.
 
     Args:
         vertices: (n, 3) [m].
@@ -62,8 +62,13 @@ def slabs(vertices: Array, faces: Indices, allowed: float, within: float) -> tup
         return ()
     placed = vertices @ frame.T / size
     body, pieces = bounded(placed, faces), list[Array]()
-    for low, high, section in _stacked(body, _levels(placed, faces), allowed / size):
-        polygons = _convex(section.simplify(within / size), allowed / size)
+    if body is None:
+        return ()
+    for low, high, projection in _stacked(body, _levels(placed, faces), allowed / size):
+        section = _without_narrow_holes(projection.simplify(within / size), allowed / size)
+        if section.num_vert() > CORNERS:
+            return ()
+        polygons = _convex(section, allowed / size)
         pieces += [prism(polygon, low, high) @ frame * size for polygon in polygons]
     return tuple(pieces) if len(pieces) <= MOST else ()
 
@@ -129,6 +134,15 @@ def _is_wide(area: Any, width: float) -> bool:
     if area.area() < pi / 4 * width**2:
         return False
     return not area.offset(-width / 2, JoinType.Miter).is_empty()
+
+
+def _without_narrow_holes(section: Any, width: float) -> Any:
+    """A section without those holes that contain no disc of such a diameter."""
+    from manifold3d import CrossSection
+
+    outlines = [(outline, CrossSection([outline[::-1]])) for outline in section.to_polygons()]
+    stay = [line for line, hole in outlines if hole.is_empty() or _is_wide(hole, width)]
+    return CrossSection(stay)
 
 
 def _convex(section: Any, allowed: float) -> list[Array]:
