@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -12,7 +13,7 @@ from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import Clearance
-from factory.apps.arms.read import MODELS, chain_of, read_chain
+from factory.apps.arms.model import ArmModel, arm_model
 from factory.apps.arms.slowness import enforce_limits
 
 PACE = WayLimits()
@@ -24,7 +25,12 @@ ANY_TOOL_SPEED = WayLimits(tool_speed=1e3, end_speed=1e3)
 @cache
 def shipped(name: str) -> SerialChain:
     """An arm of the catalogue."""
-    return read_chain(MODELS / f"{name}.xml")
+    return ArmModel.of(name).chain
+
+
+def chain_in(text: str, file: str = "arm.xml") -> SerialChain:
+    """The arm of an MJCF."""
+    return arm_model("own", Path(file), text, {}).chain
 
 
 def down(yaw: float) -> Array:
@@ -96,7 +102,7 @@ def both(seed: int) -> tuple[SerialChain, mujoco.MjModel, mujoco.MjData]:
     """A random arm, as it is read and as the engine has it."""
     text = random_arm(seed)
     m = mujoco.MjModel.from_xml_string(text)
-    return chain_of(text), m, mujoco.MjData(m)
+    return chain_in(text), m, mujoco.MjData(m)
 
 
 def configurations(chain: SerialChain, count: int, seed: int) -> Array:

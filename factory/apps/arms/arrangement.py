@@ -182,9 +182,9 @@ class Arrangement(Handling):
     def ring(self) -> Ring:
         """Where the arms stand, and between which distances from their axes they take and place.
         Raises RunError (Unreachable) where their tools do not come up and down far enough."""
-        tips, low = list[float](), float(self.product.low[2])
+        tips = list[float]()
         for label, tip in self.tip.items():
-            burden, placed = self.burdens[label], PAYLOAD + float(tip[2]) - low
+            burden, placed = self.burdens[label], self._height(float(tip[2]))
             fed = burden.source is None
             shown = self.shows(label) + float(tip[2] - burden.low[2]) if fed else placed
             tips += [

@@ -50,15 +50,16 @@ RESERVED = ("carriage", "tool", "stem", "pad", "pedestal")
 """Names of what is added to an arm."""
 
 
-def standing(model: ArmModel, stand: Stand, site: str = "tool") -> Element:
+def standing(model: ArmModel, stand: Stand) -> Element:
     """The MJCF of an arm on its stand: its outermost body is `carriage`, and `tool` is the frame of
-    its site, z out of it, with a tool as long as STEM."""
+    its site `tool`, z out of it, with a tool as long as STEM."""
     root = model.root()
     world = root.find("worldbody")
     assert world is not None
-    body = next(b for b in world.findall("body") for s in b.iter("site") if s.get("name") == site)
-    holder = next(b for b in body.iter("body") for s in b.findall("site") if s.get("name") == site)
-    mount = next(s for s in holder.findall("site") if s.get("name") == site)
+    site = "site[@name='tool']"
+    body = next(b for b in world.findall("body") if b.find(f".//{site}") is not None)
+    holder = next(b for b in body.iter("body") if b.find(site) is not None)
+    (mount,) = holder.findall(site)
     contact = _own_contact(root, body.get("name", ""))
     for node in body.iter():
         if node.get("name") in RESERVED and node is not mount:

@@ -115,6 +115,12 @@ class SerialChain:
         cross = cross_matrix(self.axis) * ~self.slides[:, None, None]
         return np.stack([self.turn, self.turn @ cross, self.turn @ cross @ cross])
 
+    @cached_property
+    def _slid(self) -> Array:
+        """How far each frame goes in the frame before it per metre of its joint (n, 3); 0 for
+        hinges."""
+        return np.asarray(np.einsum("jab,jb->ja", self.turn, self.axis) * self.slides[:, None])
+
     def frames(self, q: Array) -> tuple[Array, Array]:
         """Origins (..., n + 1, 3) [m] and orientations (..., n + 1, 3, 3) of the frames.
 
@@ -126,8 +132,7 @@ class SerialChain:
         turned = np.sin(off)[..., None, None] * sine
         turned += (1 - np.cos(off))[..., None, None] * versine
         turned += still
-        gone = np.einsum("jab,jb->ja", self.turn, self.axis) * self.slides[:, None]
-        step = self.anchor + off[..., None] * gone
+        step = self.anchor + off[..., None] * self._slid
         place = np.zeros((*off.shape[:-1], len(self) + 1, 3))
         turn = np.zeros((*place.shape, 3))
         turn[..., 0, :, :] = np.eye(3)
@@ -165,42 +170,24 @@ class SerialChain:
         """
         place, turn = self.frames(q)
         tool = place[..., -1, :] + turn[..., -1, :, :] @ self.tool_place
-        columns = self._columns(place, turn, tool, len(self))
-        return tool, turn[..., -1, :, :] @ self.tool_turn, columns
+        return tool, turn[..., -1, :, :] @ self.tool_turn, self._columns(place, turn, tool)
 
-    def point_jacobian(self, q: Array, frame: int, point: Array) -> Array:
-        """Jacobians (..., 6, n) of a point that moves with a frame.
-
-        Args:
-            q: configurations (..., n) [rad, m].
-            frame: number of the frame.
-            point: in the frame (3,) [m].
-        """
-        place, turn = self.frames(q)
-        at = place[..., frame, :] + turn[..., frame, :, :] @ point
-        return self._columns(place, turn, at, frame)
-
-    def _columns(self, place: Array, turn: Array, at: Array, count: int) -> Array:
-        """The Jacobian of points (..., 3) that the first `count` joints move."""
+    def _columns(self, place: Array, turn: Array, at: Array) -> Array:
+        """The Jacobian of points (..., 3) that all joints move."""
         axis = (turn[..., 1:, :, :] @ self.axis[..., None])[..., 0]
         arm = at[..., None, :] - place[..., 1:, :]
         slides = self.slides[:, None]
         line = np.where(slides, axis, cross(axis, arm))
         columns = np.concatenate([line, np.where(slides, 0.0, axis)], axis=-1)
-        columns[..., count:, :] = 0.0
         return np.swapaxes(columns, -1, -2)
 
     @cached_property
     def spans(self) -> Array:
         """Greatest distance of each frame's origin from that of the frame before (n,), whatever the
         configuration [m]."""
-        gone = np.einsum("jab,jb->ja", self.turn, self.axis) * self.slides[:, None]
-        ends = (self.anchor + (end - self.zero)[:, None] * gone for end in self._ends)
-        return np.asarray(np.max([np.linalg.norm(end, axis=1) for end in ends], axis=0))
-
-    @property
-    def _ends(self) -> tuple[Array, Array]:
-        return self.limits.low, self.limits.high
+        ends = np.stack([self.limits.low, self.limits.high]) - self.zero
+        places = self.anchor + ends[..., None] * self._slid
+        return np.asarray(np.linalg.norm(places, axis=2).max(axis=0))
 
     @cached_property
     def length(self) -> float:

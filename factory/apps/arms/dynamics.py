@@ -17,6 +17,9 @@ from factory.apps.arms.joint_way import JointWay, WayLimits
 GRAVITY = np.array([0.0, 0.0, -9.81])
 """In the base frame of an arm that stands upright [m/s²]."""
 
+PLACES = 300
+"""Number of places on a way at which torques are computed."""
+
 
 def torques(chain: SerialChain, q: Array, speed: Array, acceleration: Array) -> Array:
     """Torques or forces (..., n) of the drives without gravity [N m, N].
@@ -51,18 +54,17 @@ def torques(chain: SerialChain, q: Array, speed: Array, acceleration: Array) -> 
     return _joint_torques(chain, place, axis, force, couple) + chain.inertia.rotor * acceleration
 
 
-def weights(chain: SerialChain, q: Array, gravity: Array = GRAVITY) -> Array:
+def weights(chain: SerialChain, q: Array) -> Array:
     """Torques or forces (..., n) by which the drives bear the weight of the links [N m, N].
 
     Args:
         chain: the arm.
         q: configurations (..., n) [rad, m].
-        gravity: in the base frame (3,) [m/s²].
     """
     place, turn = chain.frames(q)
     axis = (turn[..., 1:, :, :] @ chain.axis[..., None])[..., 0]
     arm = (turn[..., 1:, :, :] @ chain.inertia.weight_center[..., None])[..., 0]
-    force = np.broadcast_to(-chain.inertia.weight[:, None] * gravity, arm.shape)
+    force = np.broadcast_to(-chain.inertia.weight[:, None] * GRAVITY, arm.shape)
     return _joint_torques(chain, place, axis, force, cross(arm, force))
 
 
@@ -83,7 +85,7 @@ def _joint_torques(
 
 
 def scalar_law(
-    chain: SerialChain, g: Array, first: Array, second: Array, gravity: Array = GRAVITY
+    chain: SerialChain, g: Array, first: Array, second: Array
 ) -> tuple[Array, Array, Array]:
     """α, β and γ (..., n), which are the feed-forward of the drives too.
 
@@ -92,21 +94,13 @@ def scalar_law(
         g: configurations on the way (..., n) [rad, m].
         first: g' there (..., n).
         second: g" there (..., n).
-        gravity: in the base frame (3,) [m/s²].
     """
     rest = np.zeros_like(g)
     alpha, beta = torques(chain, g, rest, first), torques(chain, g, first, second)
-    return alpha, beta, weights(chain, g, gravity)
+    return alpha, beta, weights(chain, g)
 
 
-def torque_share(
-    chain: SerialChain,
-    way: JointWay,
-    pace: WayLimits,
-    damping: float | Array = 0.0,
-    count: int = 300,
-    gravity: Array = GRAVITY,
-) -> Array:
+def torque_share(chain: SerialChain, way: JointWay, pace: WayLimits, damping: Array) -> Array:
     """Greatest share (n,) of its limit that each drive needs, at equal distances along a way.
 
     Args:
@@ -114,11 +108,9 @@ def torque_share(
         way: followed by it.
         pace: limits of the way's coordinate.
         damping: of the joints (n,) [N m s/rad, N s/m].
-        count: number of places on the way.
-        gravity: in the base frame (3,) [m/s²].
     """
-    g, first, second = way.at(np.linspace(0.0, way.length, count))
-    alpha, beta, gamma = scalar_law(chain, g, first, second, gravity)
+    g, first, second = way.at(np.linspace(0.0, way.length, PLACES))
+    alpha, beta, gamma = scalar_law(chain, g, first, second)
     push = np.abs(alpha) * pace.acceleration
     drag = np.abs(damping * first) * pace.speed
     ends = [np.abs(gamma) + push, np.abs(gamma + pace.speed**2 * beta) + push + drag]

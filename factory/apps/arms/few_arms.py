@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import inf
 
 from factory.api import Diagnostic, InputError, Project, RunError, pace, usage_error
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import RAILS, asked_arms
 from factory.apps.arms.ground import CellProject, cell_of
-
-WITHIN = 5e-3
-"""A cycle time is met within this [s]: the half of a hundredth, as it is printed."""
 
 
 def with_few_arms(
@@ -35,21 +31,20 @@ def with_few_arms(
         raise usage_error(f"--arm {asked}: with --cycle the number is looked for", f"--arm {name}")
     model, _ = asked_arms(asked)
     product = project.with_ground(replace(project.ground, cycle=None))
-    best, least, refused = None, inf, None
+    slower, refused = [], None
     for arms in ((CellArm(),), (CellArm(), CellArm())):
         try:
             made = cell_of(product, model, arms)
-            seconds = pace(made.layout, made.settings)[0].seconds
+            takes, _ = pace(made.layout, made.settings)
         except (InputError, RunError) as error:
             refused = refused or error
             continue
-        if seconds < least:
-            best, least = made, seconds
-        if least <= cycle + WITHIN:
+        if takes.meets(cycle):
             return made
-    if best is None:
+        slower.append((takes, made))
+    if not slower:
         assert refused is not None
         raise refused
-    message = f"the fastest factory found takes {least:.2f} s a product, not {cycle:g} s"
-    warn(Diagnostic("SlowCycle", message, None, f"--cycle {least:.2f}; {RAILS}"))
+    takes, best = min(slower, key=lambda one: one[0].seconds)
+    warn(takes.too_slow(cycle, RAILS))
     return best

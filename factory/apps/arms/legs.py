@@ -59,16 +59,16 @@ class NoWay:
 class _Search:
     """The search for a transfer: what is clear, and what was not."""
 
-    def __init__(self, clearance: Clearance, reserve: float) -> None:
-        self.clearance, self.reserve = clearance, reserve
+    def __init__(self, clearance: Clearance) -> None:
+        self.clearance = clearance
         self.pairs: dict[int, list[float]] = {}
 
     def clear(self, a: Array, b: Array) -> bool:
         """Whether the straight joint line between two configurations is clear."""
         margin, pair = self.clearance(line(a, b))
-        bad = margin < self.reserve
+        bad = margin < RESERVE
         for number, depth in zip(pair[bad].tolist(), margin[bad].tolist(), strict=True):
-            self.pairs.setdefault(number, []).append(self.reserve - depth)
+            self.pairs.setdefault(number, []).append(RESERVE - depth)
         return not bad.any()
 
     def no_way(self) -> NoWay:
@@ -106,9 +106,7 @@ def transfer(
     b: Array,
     clearance: Clearance,
     limits: tuple[Array, Array],
-    seed: int = 0,
     rounds: int = ROUNDS,
-    reserve: float = RESERVE,
 ) -> Array | NoWay:
     """A clear polyline (k, n) in joint space [rad, m], or why none was seen.
 
@@ -117,14 +115,12 @@ def transfer(
         b: its end (n,) [rad, m].
         clearance: of configurations.
         limits: least and greatest joint positions (n,) [rad, m].
-        seed: of the random search.
         rounds: how often the trees grow.
-        reserve: least margin [m].
     """
-    search, rng = _Search(clearance, reserve), np.random.default_rng(seed)
+    search, rng = _Search(clearance), np.random.default_rng(0)
     if search.clear(a, b):
         return line(a, b)
-    ends = clearance(np.stack([a, b]))[0] >= reserve
+    ends = clearance(np.stack([a, b]))[0] >= RESERVE
     path = _connect(a, b, search, limits, rng, rounds) if ends.all() else None
     if path is None:
         return search.no_way()
@@ -182,7 +178,6 @@ def leg(
     clearance: Clearance,
     ends: Clearance,
     pace: WayLimits,
-    seed: int = 0,
     stiff: tuple[float, float] = STIFF,
 ) -> JointWay | NoWay:
     """The way from one visit to the next, or why there is none.
@@ -194,11 +189,10 @@ def leg(
         clearance: of configurations on the transfer.
         ends: of configurations on the straight beginning and end.
         pace: limits of the coordinate and the tool.
-        seed: of the random search.
         stiff: shares of the straight beginning and end that are not rounded.
     """
     limits = chain.limits.low, chain.limits.high
-    middle = transfer(out[-1], into[0], clearance, limits, seed)
+    middle = transfer(out[-1], into[0], clearance, limits)
     if isinstance(middle, NoWay):
         return middle
     blocked: NoWay | None = None

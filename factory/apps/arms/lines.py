@@ -18,6 +18,7 @@ from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.certificate import PAYLOAD_BODY, Region
 from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
 from factory.floor.layout.guidepath import Box, hull, moved
+from factory.floor.layout.hands.limbs import limbs
 
 LANE = 0.32
 """From the station to either end of a line, without the length of what it carries [m]."""
@@ -101,8 +102,10 @@ class Line:
 
     @cached_property
     def top(self) -> float:
-        """Height of its top [m]."""
-        return PAYLOAD + float(self._ends[1][2] - self.product.low[2])
+        """Height of its top, or of that of the carrier's hand [m]."""
+        low, high = (float(end[2] - self.product.low[2]) for end in self._ends)
+        hand = max((limb.high[2] for limb in limbs(self.rails, 0)), default=PAYLOAD)
+        return max(PAYLOAD + high, hand + low)
 
     @cached_property
     def behind(self) -> float:

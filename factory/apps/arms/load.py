@@ -11,12 +11,9 @@ from factory.apps.arms.burdens import Burden
 from factory.apps.arms.cell import ToolGrip
 from factory.apps.arms.chain import SerialChain, cross
 from factory.apps.arms.crew import RAILS
-from factory.apps.arms.dynamics import GRAVITY, torque_share
+from factory.apps.arms.dynamics import GRAVITY, PLACES, torque_share
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.floor.layout.hands.tips import STRONG, tip
-
-PLACES = 300
-"""Number of places on a way at which loads are computed."""
 
 STEP = 1e-4
 """Between the places of a difference quotient [m]."""

@@ -9,16 +9,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, Position, mujoco, usage_error
+from factory.api import InputError, mujoco, usage_error
 from factory.apps.arms.chain import SerialChain
-from factory.apps.arms.read import MODELS, chain_of, read_chain
+from factory.apps.arms.read import bad_arm, chain_of
+
+MODELS = Path(__file__).parent / "mjcf"
+"""Where the arms of the catalogue are."""
 
 KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
 """The arms that are shipped."""
@@ -84,15 +86,12 @@ def own_arm(
     kind = kind if kind[:1].isalpha() and kind not in KINDS else f"arm_{kind}"
     try:
         spec = mujoco.MjSpec.from_file(str(file))
-        spec.compile()
+        m = spec.compile()
         root = ElementTree.fromstring(spec.to_xml())
     except ValueError as error:
-        message = f"the engine cannot compile it: {error}"
-        raise InputError(
-            Diagnostic("BadArm", message, Position(str(file), 1, 1), "valid MJCF")
-        ) from error
-    if tool != "tool" and tool not in [site.get("name") for site in root.iter("site")]:
-        read_chain(file, tool)  # which says so
+        raise _not_compiled(str(file), error) from error
+    if tool not in [site.get("name") for site in root.iter("site")]:
+        chain_of(m, file.name, tool)  # which says so
     files = dict[str, bytes]()
     compiler = root.find("compiler")
     folder = file.parent / (compiler.get("meshdir", "") if compiler is not None else "")
@@ -128,9 +127,9 @@ def _call_tool(root: Element, name: str) -> None:
             site.set("name", "tool" if site.get("name") == name else "tool/of its file")
 
 
-@lru_cache(maxsize=8)
-def _read(text: str, name: str) -> SerialChain:
-    return chain_of(text, name=name)
+def _not_compiled(file: str, error: ValueError) -> InputError:
+    words = " ".join(str(error).split())
+    return bad_arm(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
 
 
 def arm_model(kind: str, file: Path, text: str, files: Mapping[str, bytes]) -> ArmModel:
@@ -142,8 +141,11 @@ def arm_model(kind: str, file: Path, text: str, files: Mapping[str, bytes]) -> A
         text: the MJCF.
         files: its meshes by name.
     """
-    chain = chain_of(text, name=file.name, files=files) if files else _read(text, file.name)
-    m = mujoco.MjModel.from_xml_string(text, dict(files))
+    try:
+        m = mujoco.MjModel.from_xml_string(text, dict(files))
+    except ValueError as error:
+        raise _not_compiled(file.name, error) from error
+    chain = chain_of(m, file.name)
     return ArmModel(kind, file, text, chain, tuple(_gains(m, chain)), files)
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from factory.api import Array, Diagnostic, Layout, RunError, Solid
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.crew import RAILS
@@ -12,7 +14,9 @@ from factory.apps.arms.scene import StandingBox
 from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.guidepath import Box
+from factory.floor.layout.hands.limbs import Limb, limbs
 from factory.floor.layout.outfeed import shed_with_uprights
+from factory.floor.layout.staying import in_world
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""
@@ -26,6 +30,11 @@ def feeder_name(label: str) -> str:
 def placed_name(label: str, line: Line) -> str:
     """What a part on a line is called."""
     return f"'{label}' on {line.name}" if line.carrier else f"'{label}' in the product"
+
+
+def limb_name(limb: Limb, line: Line) -> str:
+    """What a limb of a carrier's hand is called."""
+    return f"the {limb.name.rpartition('/')[2]} of {line.name}"
 
 
 def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox]:
@@ -45,6 +54,7 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
         yield from line.standing
         for label, solid in line.rails.product.solids.items():
             yield from _part(solid, placed_name(label, line), cell.placed(carrier))
+        yield from _hand_of(line, bare)
         yield from _feeder_of(cell, carrier, bare)
     box, top = shed_with_uprights(bare)
     yield upright("the outfeed's shed", box, 0.0, top)
@@ -62,6 +72,16 @@ def _part(solid: Solid, name: str, off: Array) -> Iterator[StandingBox]:
         xlo, ylo, zlo = (low + off).tolist()
         xhi, yhi, zhi = (high + off).tolist()
         yield StandingBox(name, (xlo, ylo, zlo), (xhi, yhi, zhi))
+
+
+def _hand_of(line: Line, bare: Layout) -> Iterator[StandingBox]:
+    """The limbs of a carrier's hand where it stands at the station."""
+    path, (x, y) = bare.guidepaths[line.carrier], line.station
+    (u, v), (s, t) = path.heading, path.side
+    at = x - u * path.reach + s * path.offset, y - v * path.reach + t * path.offset
+    for limb in limbs(bare, line.carrier):
+        ((low, high),) = in_world(np.array([[limb.low, limb.high]]), path.heading, at)
+        yield StandingBox(limb_name(limb, line), tuple(low.tolist()), tuple(high.tolist()))
 
 
 def _feeder_of(cell: Arrangement, carrier: int, bare: Layout) -> Iterator[StandingBox]:

@@ -23,11 +23,12 @@ from factory.apps.arms.inverse import tool_lines
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import NoWay, leg
 from factory.apps.arms.model import ArmModel
-from factory.apps.arms.obstacles import feeder_name, obstacles, placed_name
+from factory.apps.arms.obstacles import obstacles
 from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.rises import Rise, StraightEnd
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
+from factory.apps.arms.spared import Spared
 from factory.floor.geometry.turning import about_vertical
 
 YAWS = 8
@@ -36,8 +37,9 @@ YAWS = 8
 AT_END = 0.001
 """Clearance of an arm's links on its straight ends, at samples [m]."""
 
-CERTAIN, CERTAIN_AT_END = 0.004, 2e-4
-"""Clearance that is certified on transfers, and on straight ends [m]."""
+CERTAIN, CERTAIN_AT_END, CERTAIN_AT_HAND = 0.004, 2e-4, 1e-4
+"""Clearance that is certified on transfers, on straight ends, and of what an arm places from the
+hand of a carrier, whose pads are 0.2 mm from faces that may go on over what is placed [m]."""
 
 SAME = 0.03
 """Places that are nearer are one, as far as the tool's angle is concerned [m]."""
@@ -83,6 +85,7 @@ class ArmPlanner:
         loads = {label: cell.loads(label) for label in self.labels}
         stand = cell.stands[arm]
         self.scene = Scene(model, standing(model, stand), loads, [*obstacles(cell, arm, bare)])
+        self.spared = Spared(cell, bare)
         m = self.scene.m
         self._held = {
             label: [(m.geom_pos[g].copy(), m.geom_quat[g].copy()) for g in geoms]
@@ -117,8 +120,7 @@ class ArmPlanner:
             if not line.steps:
                 continue
             x, y = line.stand(operations.get(carrier))
-            parts = {placed_name(part, line) for part in line.rails.product.solids}
-            self.scene.move(parts, (x - line.station[0], y - line.station[1], 0.0))
+            self.scene.move(self.spared.on(line), (x - line.station[0], y - line.station[1], 0.0))
 
     def _hold(self, label: str, yaw: float) -> None:
         """Hold a part with the tool at an angle [rad]."""
@@ -164,8 +166,8 @@ class ArmPlanner:
         shown = cell.local(self.arm, cell.tip_shown(label) + cell.shown(label))
         placed = cell.local(self.arm, cell.tip[label] + cell.placed(burden.onto, burden.join))
         self._have(burden.stops)
-        at, under = self._spared_at(label), self._spared_under(label)
-        spared = (at & under) | ((at | under) - self._moving)  # parts count that do at either end
+        at, under, moving = self.spared.at(label), self.spared.under(label), self.spared.moving
+        spared = (at & under) | ((at | under) - moving)  # parts count that do at either end
 
         def clearance(q: Array) -> tuple[Array, Index]:
             return self.scene.margins(q, "", CERTAIN_AT_END, spared)
@@ -220,35 +222,6 @@ class ArmPlanner:
             message += f" and goes straight {goes} by {rise * 1e3:.0f} mm at both ends"
         return Diagnostic("Unreachable", message, position, RAILS)
 
-    def _spared_at(self, label: str, loaded: bool = False) -> set[str]:
-        """What does not count where the tool takes something: its feeder, or the carrier that it is
-        on with the part that it touches there, and with all of it where the tool is loaded."""
-        burden, cell = self.cell.burdens[label], self.cell
-        if burden.source is None:
-            return {f"'{label}'", feeder_name(label), *self._moving}
-        line = cell.lines[burden.source]
-        there = {placed_name(part, line) for part in burden.parts}
-        touched = there if loaded else {placed_name(burden.hold.part, line)}
-        return {line.name, *self._moving} - (there - touched)
-
-    def _spared_under(self, label: str) -> set[str]:
-        """What does not count where the tool places something, and where it leaves that: the
-        carrier, and all but what it is placed onto."""
-        burden = self.cell.burdens[label]
-        line = self.cell.lines[burden.onto]
-        there = {placed_name(part, line) for part in burden.there}
-        return {line.name, f"'{label}'", *self._moving} - there
-
-    @cached_property
-    def _moving(self) -> set[str]:
-        """What does not count on a transfer: what is on a carrier, which all is within what that
-        takes."""
-        return {
-            placed_name(part, line)
-            for line in self.cell.lines.values()
-            for part in line.rails.product.solids
-        }
-
     def _lines(
         self, visits: Sequence[tuple[float, Array, Array]]
     ) -> list[list[tuple[Rise, Array, bool]]]:
@@ -273,10 +246,10 @@ class ArmPlanner:
         self, out: StraightEnd, into: StraightEnd, label: str, before: str, after: str
     ) -> JointWay:
         """The way from a part to a part, with another held; certified. Raises RunError (NoWay)."""
-        scene, every = self.scene, self._moving
+        scene, every = self.scene, self.spared.moving
         left, taken_next = self.cell.burdens[before], self.cell.burdens[after]
         self._have({left.onto: left.join, taken_next.source: taken_next.takes})
-        taken, pile = self._spared_at(after, bool(label)), self._spared_under(before)
+        taken, pile = self.spared.at(after, bool(label)), self.spared.under(before)
         first, last = (taken, pile) if label else (pile, taken)
         way = leg(
             self.chain,
@@ -295,10 +268,13 @@ class ArmPlanner:
                 ((way.hover, way.length), last, CERTAIN_AT_END, False),
             )
             bodies = [*self.chain.bodies, *self._carried(label)]
-            if label and not self.cell.burdens[label].comes[2]:
-                line = self.cell.lines[self.cell.burdens[label].onto].name
-                there = {f"'{label}'", line, *every}
-                certified += (((way.hover, way.length), there, CERTAIN, True),)
+            if label:
+                line, end = self.cell.lines[self.cell.burdens[label].onto], (way.hover, way.length)
+                others = {*scene.obstacles} - self.spared.hand(line)
+                certified += ((end, others, CERTAIN_AT_HAND, True),)
+                if not self.cell.burdens[label].comes[2]:
+                    there = {f"'{label}'", line.name, *every}
+                    certified += ((end, there, CERTAIN, True),)
             faults = (
                 uncertified(
                     self.chain,

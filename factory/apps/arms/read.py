@@ -1,4 +1,4 @@
-"""Serial chains from MJCF: any file with one chain of hinge and slide joints from a fixed base, and
+"""Serial chains of MJCF: any model with one chain of hinge and slide joints from a fixed base, and
 a site at the tool.
 
 All is read from the model that the engine compiles, so the compiler's settings, such as degrees or
@@ -9,83 +9,38 @@ radians, are those of the file. Speeds and accelerations, for which MJCF has no 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from factory.api import Array, Diagnostic, InputError, Position, mujoco, rotation
 from factory.apps.arms.chain import ConvexBody, JointLimits, LinkInertia, SerialChain, steiner
 
-MODELS = Path(__file__).parent / "mjcf"
-"""Where the arms of the catalogue are."""
-
 SIDES = 16
 """Number of sides of the prism round a cylinder."""
 
 
-def read_chain(
-    path: Path, tool: str = "tool", values: Mapping[str, Sequence[float]] | None = None
-) -> SerialChain:
-    """The chain of an MJCF file.
+def chain_of(m: mujoco.MjModel, file: str, tool: str = "tool") -> SerialChain:
+    """The chain of a model.
 
     Args:
-        path: of the file; its includes and meshes are relative to it.
+        m: the model.
+        file: what errors call its file.
         tool: name of the site at the tool.
-        values: `speed` and `acceleration` of each joint [rad/s, m/s, rad/s², m/s²], which come
-            before those in the file.
     """
-    try:
-        m = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise _compile_error(path.name, error) from error
-    return _Reader(m, path.name, tool, values or {}).chain()
+    return _Reader(m, file, tool).chain()
 
 
-def chain_of(
-    xml: str,
-    tool: str = "tool",
-    values: Mapping[str, Sequence[float]] | None = None,
-    name: str = "arm.xml",
-    files: Mapping[str, bytes] | None = None,
-) -> SerialChain:
-    """The chain of the text of an MJCF file.
-
-    Args:
-        xml: the text.
-        tool: name of the site at the tool.
-        values: `speed` and `acceleration` of each joint [rad/s, m/s, rad/s², m/s²], which come
-            before those in the text.
-        name: what errors call the text.
-        files: its meshes by name.
-    """
-    try:
-        m = mujoco.MjModel.from_xml_string(xml, dict(files or {}))
-    except ValueError as error:
-        raise _compile_error(name, error) from error
-    return _Reader(m, name, tool, values or {}).chain()
-
-
-def _error(file: str, message: str, hint: str) -> InputError:
+def bad_arm(file: str, message: str, hint: str) -> InputError:
+    """What is said of a file that is no arm (BadArm)."""
     return InputError(Diagnostic("BadArm", message, Position(file, 1, 1), hint))
-
-
-def _compile_error(file: str, error: ValueError) -> InputError:
-    words = " ".join(str(error).split())
-    return _error(file, f"the engine cannot compile it: {words}", "an arm is a file of valid MJCF")
 
 
 class _Reader:
     """The reading of one compiled model."""
 
-    def __init__(
-        self,
-        m: mujoco.MjModel,
-        file: str,
-        tool: str,
-        values: Mapping[str, Sequence[float]],
-    ) -> None:
-        self.m, self.file, self.values = m, file, values
+    def __init__(self, m: mujoco.MjModel, file: str, tool: str) -> None:
+        self.m, self.file = m, file
         self._refuse_joints()
         sites = [m.site(k).name for k in range(m.nsite)]
         if tool not in sites:
@@ -100,7 +55,7 @@ class _Reader:
         self.place, self.turn = self._poses()
 
     def _refuse(self, message: str, hint: str) -> None:
-        raise _error(self.file, message, hint)
+        raise bad_arm(self.file, message, hint)
 
     def _joint(self, number: int) -> str:
         return f"joint '{self.m.joint(number).name or number + 1}'"
@@ -211,9 +166,9 @@ class _Reader:
         return force
 
     def _values(self, name: str) -> Array:
-        """Limits of a kind that are given, or those of the file."""
+        """Limits of a kind."""
         rows = {self.m.numeric(k).name: self.m.numeric(k).data for k in range(self.m.nnumeric)}
-        row = np.array(self.values.get(name, rows.get(name, ())), float)
+        row = np.array(rows.get(name, ()), float)
         count = self.m.njnt
         valid = f"{name} = [...], {count} numbers above 0, one for each joint [rad, m, s]"
         if not row.size:

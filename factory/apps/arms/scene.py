@@ -68,26 +68,10 @@ class Scene:
         tool = next(b for b in world.iter("body") if b.get("name") == "tool")
         for label, boxes in loads.items():
             for number, (place, half, turn) in enumerate(boxes):
-                ElementTree.SubElement(
-                    tool,
-                    "geom",
-                    name=f"load/{number}/{label}",
-                    type="box",
-                    pos=" ".join(map(str, place.tolist())),
-                    size=" ".join(map(str, half.tolist())),
-                    quat=" ".join(map(str, turn.tolist())),
-                    mass="0",
-                )
+                _put(tool, f"load/{number}/{label}", pos=place, size=half, quat=turn)
         for number, one in enumerate(obstacles):
             low, high = np.array(one.low), np.array(one.high)
-            ElementTree.SubElement(
-                world,
-                "geom",
-                name=f"box/{number}",
-                type="box",
-                pos=" ".join(map(str, ((low + high) / 2).tolist())),
-                size=" ".join(map(str, ((high - low) / 2).tolist())),
-            )
+            _put(world, f"box/{number}", pos=(low + high) / 2, size=(high - low) / 2)
         self.m = m = model.compiled(root)
         self.d = mujoco.MjData(m)
         self.names = [m.geom(g).name for g in range(m.ngeom)]
@@ -253,6 +237,12 @@ class Scene:
         """The links that a payload may come to: with two joints or more between."""
         last = max(self._depth[g] for g in self.links)
         return [g for g in (*self.base, *self.links) if self._depth[g] <= last - 2]
+
+
+def _put(body: Element, name: str, **values: Array) -> None:
+    """Put a box into a body."""
+    said = {key: " ".join(map(str, value.tolist())) for key, value in values.items()}
+    ElementTree.SubElement(body, "geom", {"name": name, "type": "box", **said})
 
 
 def _away(place: Array, low: Array, high: Array) -> Array:

@@ -17,7 +17,8 @@ from factory.apps.arms.joint_way import JointWay, WayLimits
 STEP, FEWEST, MOST = 0.0015, 600, 4000
 """The spacing of samples of t [s at the joints' full speed], and bounds on their number."""
 
-KNOTS = 200
+KNOTS, PLACES = 200, 400
+"""Numbers of knots of a way, and of places on it at which the tool's speed is computed."""
 
 STIFF = 0.47, 0.47
 """Shares of the straight beginning and end that are not rounded: 40 of 85 mm."""
@@ -140,17 +141,16 @@ def enforce_limits(way: JointWay, chain: SerialChain, pace: WayLimits) -> JointW
     return way.stretch(share * (1 + 1e-12)) if share > 1.0 else way
 
 
-def tool_shares(chain: SerialChain, way: JointWay, pace: WayLimits, count: int = 400) -> Array:
-    """The shares of its limit (count,) that the tool's speed has at equal distances along a way,
+def tool_shares(chain: SerialChain, way: JointWay, pace: WayLimits) -> Array:
+    """The shares of its limit (PLACES,) that the tool's speed has at equal distances along a way,
     where the coordinate has its greatest speed.
 
     Args:
         chain: the arm.
         way: followed by it.
         pace: limits of the coordinate and the tool.
-        count: number of places on the way.
     """
-    q, first, _ = way.at(np.linspace(0.0, way.length, count))
+    q, first, _ = way.at(np.linspace(0.0, way.length, PLACES))
     tool, _, columns = chain.tool_and_jacobian(q)
     speed = np.linalg.norm((columns[:, :3] @ first[..., None])[..., 0], axis=1) * pace.speed
     return np.asarray(speed / _tool_limits(tool, pace))

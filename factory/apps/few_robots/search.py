@@ -29,9 +29,6 @@ SINGLE, SHARED = 0.3, 0.8
 """Shares of the effort after which factories with one robot for each label are no longer tried, and
 after which estimates are no longer laid out."""
 
-WITHIN = 5e-3
-"""A cycle time is met within this [s]: the half of a hundredth, as it is printed."""
-
 Seen = Callable[[Candidate, Candidate], None]
 """Told of each candidate, and of the best so far."""
 
@@ -76,10 +73,8 @@ def allocated(
         plain = best if best.filling is None else search.written
         relayed = replace(plain, single=plain.single.with_ground(project.ground))
         best = min(best, relayed, key=search.rank)
-    if aim.cycle is not None and best.has_layout and best.seconds > aim.cycle + WITHIN:
-        message = f"the fastest factory found takes {best.seconds:.2f} s a product"
-        hint = f"--cycle {best.seconds:.2f}, or a longer search with more --effort"
-        warn(Diagnostic("SlowCycle", f"{message}, not {aim.cycle:g} s", None, hint))
+    if aim.cycle is not None and best.has_layout and not best.pace.meets(aim.cycle):
+        warn(best.pace.too_slow(aim.cycle, "a longer search with more --effort"))
     return best.project
 
 

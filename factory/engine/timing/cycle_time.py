@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from factory.support.errors import did_you_mean
+from factory.support.errors import Diagnostic, did_you_mean
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.ways import train_ratio
@@ -16,6 +16,9 @@ Delays = Mapping[str, float] | Sequence[float]
 """Seconds that a token stays on a place: by the place's name (an operation's is its label), or by
 the numbers of the first places, which are the operations. A place left out takes no time."""
 
+WITHIN = 5e-3
+"""A cycle time is met within this [s]: the half of a hundredth, as it is printed."""
+
 
 @dataclass(frozen=True, slots=True)
 class CycleTime:
@@ -23,6 +26,17 @@ class CycleTime:
 
     seconds: float
     bottleneck: str
+
+    def meets(self, asked: float) -> bool:
+        """Whether it is no longer than the cycle time asked for [s]."""
+        return self.seconds <= asked + WITHIN
+
+    def too_slow(self, asked: float, instead: str) -> Diagnostic:
+        """That no factory was found that meets the cycle time asked for [s] (SlowCycle), and what
+        to do instead."""
+        least = f"{self.seconds:.2f}"
+        message = f"the fastest factory found takes {least} s a product, not {asked:g} s"
+        return Diagnostic("SlowCycle", message, None, f"--cycle {least}, or {instead}")
 
 
 def cycle_time(

@@ -3,6 +3,7 @@ say what blocked them; the configurations of a circuit are the best."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -95,7 +96,9 @@ def test_no_point_is_faster_than_its_levers() -> None:
         q, frame = configurations(chain, 100, seed), len(chain)
         points = np.random.default_rng(seed).normal(size=(3, 3)) * 0.1
         lever = chain.lever(frame, points)
-        columns = np.array([chain.point_jacobian(q, frame, point)[:, :3] for point in points])
+        columns = np.array(
+            [replace(chain, tool_place=point).jacobian(q)[:, :3] for point in points]
+        )
         speed = np.linalg.norm(columns, axis=2).max(axis=(0, 1))
         assert (speed <= lever + 1e-12).all()
         used = max(used, float((speed / lever)[~chain.slides].max(initial=0.0)))
@@ -139,21 +142,28 @@ def test_nothing_is_nearer_than_the_lemma_says() -> None:
 
 
 @pytest.mark.parametrize(
-    ("label", "held"), [("lid", [True, True, False]), ("", [False, True, False])]
+    ("label", "held"), [("lid", [True, True, False, True]), ("", [False, True, False])]
 )
 def test_a_part_counts_until_it_is_over_its_place(
     label: str, held: list[bool], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is judged with the arm while the arm takes it up and on the way, at its place no more."""
+    """It is judged with the arm while the arm takes it up and on the way; at its place no more, but
+    for the hand of the carrier there."""
     asked = list[Any]()
     way = JointWay(np.linspace(0.0, 1.0, 5), np.zeros((5, 2)), 0.1, 0.8)
     planner: Any = ArmPlanner.__new__(ArmPlanner)
     planner.chain = SimpleNamespace(bodies=[])
-    planner.scene = SimpleNamespace(margins=lambda q, label, need, spared, held: held)
+    stands = {"the floor", "the bar of the carrier"}
+    planner.scene = SimpleNamespace(
+        margins=lambda q, label, need, spared, held: (held, spared), obstacles=stands
+    )
     burden = SimpleNamespace(onto=0, source=1, join=None, takes=None, comes=(0, 0, 1))
-    planner.cell = SimpleNamespace(burdens=dict.fromkeys(("lid", "tub"), burden))
-    planner.pace, planner._moving = None, frozenset()
-    for name in ("_have", "_carried", "_spared_at", "_spared_under"):
+    planner.cell = SimpleNamespace(burdens=dict.fromkeys(("lid", "tub"), burden), lines=[None])
+    planner.pace, empty = None, lambda *_: set()
+    planner.spared = SimpleNamespace(
+        moving=frozenset(), at=empty, under=empty, hand=lambda _: {"the bar of the carrier"}
+    )
+    for name in ("_have", "_carried"):
         monkeypatch.setattr(ArmPlanner, name, lambda *_: set())
     monkeypatch.setattr(planning, "leg", lambda *_, **__: way)
 
@@ -165,5 +175,7 @@ def test_a_part_counts_until_it_is_over_its_place(
     monkeypatch.setattr(planning, "uncertified", certify)
     end = SimpleNamespace(rows=np.zeros((2, 2)), share=0.1)
     assert planner._leg(end, end, label, "tub", "lid") is way
-    assert [stretch for stretch, _ in asked] == [(0.0, 0.1), (0.1, 0.8), (0.8, 1.0)]
-    assert [counts for _, counts in asked] == held
+    stretches = [(0.0, 0.1), (0.1, 0.8), (0.8, 1.0), (0.8, 1.0)]
+    assert [stretch for stretch, _ in asked] == stretches[: len(held)]
+    assert [counts for _, (counts, _) in asked] == held
+    assert not label or asked[-1][1][1] == {"the floor"}

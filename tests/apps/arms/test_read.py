@@ -12,9 +12,8 @@ import trimesh
 from factory.api import InputError
 from factory.apps.arms.body import Stand, standing
 from factory.apps.arms.certifying import uncertified
-from factory.apps.arms.model import KINDS, ArmModel
-from factory.apps.arms.read import MODELS, chain_of, read_chain
-from tests.arm_models import random_way, shipped
+from factory.apps.arms.model import KINDS, MODELS, ArmModel
+from tests.arm_models import chain_in, random_way, shipped
 
 LIMITS = (
     '<custom><numeric name="speed" data="1 2"/><numeric name="acceleration" data="3 4"/></custom>'
@@ -59,7 +58,7 @@ BAD = {
 @pytest.mark.parametrize("words", BAD)
 def test_what_is_no_arm_is_refused_by_name(words: str) -> None:
     with pytest.raises(InputError) as caught:
-        chain_of(BAD[words], name="ur.xml")
+        chain_in(BAD[words], "ur.xml")
     (diagnostic,) = caught.value.diagnostics
     assert diagnostic.code == "BadArm" and words in diagnostic.message
     assert diagnostic.hint and str(diagnostic.position).startswith("ur.xml:")
@@ -68,7 +67,7 @@ def test_what_is_no_arm_is_refused_by_name(words: str) -> None:
 def test_hints_say_what_would_be_valid() -> None:
     def hint(words: str) -> str:
         with pytest.raises(InputError) as caught:
-            chain_of(BAD[words])
+            chain_in(BAD[words])
         return caught.value.diagnostics[0].hint
 
     assert hint("has no site 'tool'") == ('add <site name="tool"/> at the tool (its sites are tip)')
@@ -81,9 +80,9 @@ def test_torque_is_the_least_of_what_joint_and_drive_allow() -> None:
         '<actuator><position joint="pan" kp="1" forcerange="-9 7"/>'
         '<motor joint="wrist" gear="3" ctrlrange="-2 2"/></actuator>'
     )
-    assert chain_of(arm(after=drives)).limits.torque.tolist() == [7.0, 6.0]
+    assert chain_in(arm(after=drives)).limits.torque.tolist() == [7.0, 6.0]
     weak = FIRST.replace("/>", ' actuatorfrcrange="-5 6"/>')
-    assert chain_of(arm(first=weak, after=drives)).limits.torque.tolist() == [5.0, 6.0]
+    assert chain_in(arm(first=weak, after=drives)).limits.torque.tolist() == [5.0, 6.0]
 
 
 def surface(m: mujoco.MjModel, geom: int, ways: np.ndarray) -> np.ndarray:
@@ -124,7 +123,7 @@ def geoms(wrist: str) -> str:
 def test_bodies_contain_their_geoms_and_hardly_more() -> None:
     """In 500 directions, for each kind of geom; a cylinder's prism is 2 % wider."""
     text = geoms(SECOND)
-    chain, m = chain_of(text), mujoco.MjModel.from_xml_string(text)
+    chain, m = chain_in(text), mujoco.MjModel.from_xml_string(text)
     d = mujoco.MjData(m)
     rng = np.random.default_rng(1)
     q = np.array([0.4, -0.7])
@@ -164,14 +163,6 @@ def test_the_shipped_arms_show_only_what_is_solid(name: str) -> None:
     for body in bodies:
         assert (extents[body, False] <= extents[body, True] + 1e-9).all(), m.body(body).name
         assert (extents[body, False] >= extents[body, True] - 0.02).all()
-
-
-def test_a_file_is_read_where_it_is(tmp_path: Path) -> None:
-    """Meshes beside it are found; a file that is not there is an error of the same kind."""
-    (tmp_path / "arm.xml").write_text(arm())
-    assert read_chain(tmp_path / "arm.xml").joints == ("pan", "wrist")
-    with pytest.raises(InputError, match="cannot compile"):
-        read_chain(tmp_path / "none.xml")
 
 
 OWN = """<mujoco model="own">

@@ -1,4 +1,4 @@
-"""Tall blocks, of which drawn products are made: what is in an arm's way, and what it holds."""
+"""Blocks, of which drawn products are made: what is in an arm's way, and what it holds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from factory.apps.arms import planning
 from factory.apps.arms.scene import StandingBox
 from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
-from tests.arm_cells import chains, project
+from tests.arm_cells import chains, project, refusal
 
 TALL = """root = x;
 x = mate ( a, b );
@@ -65,6 +65,30 @@ p2 = atomic ( box = (0.01, 0.02, 0.03), pos = (-0.003, 0.006, 0.1155) );
 p3 = atomic ( box = (0.02, 0.04, 0.1), pos = (0.0205, 0.014, 0.05) );
 p4 = atomic ( box = (0.02, 0.02, 0.01), pos = (0.003, -0.0145, 0.1055) )"""
 """s3 is held on its face towards -y, and comes from a side."""
+
+
+UNDER_A_HAND = """root = s2;
+s1 = mate ( p2, p1 );
+s2 = mate ( s1, p0 );
+p0 = atomic ( cylinder = (0.02, 0.02), pos = (0, 0, 0.01) );
+p1 = atomic ( box = (0.06, 0.01, 0.1), pos = (0.0505, -0.005, 0.05) );
+p2 = atomic ( cylinder = (0.02, 0.02), pos = (0.0585, 0.012, 0.111) );"""
+"""The carrier holds p2 from behind, by a bar over where p0 belongs."""
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (UNDER_A_HAND, "stem and the bar of the carrier"),
+        (ON_A_FACE, "s3/taken and the pad of the carrier"),  # which is 0.2 mm from s3, too
+    ],
+)
+def test_a_carriers_hand_is_in_an_arms_way(
+    text: str, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And in that of what the arm brings."""
+    monkeypatch.setattr(planning, "CERTAIN_AT_HAND", 3e-4)
+    assert said in refusal(text).message
 
 
 def test_what_is_held_on_a_face_hangs_on_that_face() -> None:
