@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.clearance import certify as certify
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.embedding import certified as certified
+    from factory.floor.layout.guidepath import Box as Box
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.guidepath import Point2 as Point2
     from factory.floor.layout.hands.choosing import Hands as Hands
@@ -55,13 +56,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.shapes import payload_boxes as payload_boxes
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
-    from factory.support.arrays import Array as Array
-    from factory.support.arrays import Index as Index
-    from factory.support.arrays import Indices as Indices
-    from factory.support.arrays import Truth as Truth
     from factory.support.bounds import Allowance as Allowance
-    from factory.support.collector import collector_paused as collector_paused
-    from factory.support.engine import mujoco as mujoco
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
@@ -69,13 +64,7 @@ if TYPE_CHECKING:
     from factory.support.errors import RunError as RunError
     from factory.support.errors import did_you_mean as did_you_mean
     from factory.support.errors import usage_error as usage_error
-    from factory.support.files import read_bytes as read_bytes
-    from factory.support.files import write_all as write_all
     from factory.support.settings import Settings as Settings
-    from factory.support.tables import misfit as misfit
-    from factory.support.tables import table_of as table_of
-    from factory.support.tables import value_of as value_of
-    from factory.support.version import optional as optional
     from factory.theory.control.laws import Setting as Setting
     from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
@@ -115,16 +104,10 @@ HOMES = {
     "support.errors": "Diagnostic FactoryError InputError Position RunError "
     "did_you_mean usage_error",
     "support.settings": "Settings",
-    "support.arrays": "Array Index Indices Truth",
     "support.bounds": "Allowance",
-    "support.collector": "collector_paused",
-    "support.engine": "mujoco",
-    "support.files": "read_bytes write_all",
-    "support.tables": "misfit table_of value_of",
-    "support.version": "optional",
     "support.apps": "App",
     "theory.problem.ids": "PlaceId TransitionId",
-    "theory.problem.pag": "NOPART PAG Assembly",
+    "theory.problem.pag": "Assembly NOPART PAG",
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue load_catalogue",
     "theory.problem.template": "Template",
@@ -132,7 +115,7 @@ HOMES = {
     "theory.lang.source": "read_text",
     "theory.lang.writer": "write_pag",
     "theory.nets.gears": "GearNet",
-    "theory.nets.marked": "NONE MarkedNet marked token_free",
+    "theory.nets.marked": "MarkedNet NONE marked token_free",
     "theory.nets.petri": "Marking PetriNet Place Transition",
     "theory.nets.undone": "Entry Undone",
     "theory.nets.verdict": "Verdict listing",
@@ -149,7 +132,7 @@ HOMES = {
     "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",
     "floor.layout.embedding": "certified",
-    "floor.layout.guidepath": "Guidepath Point2",
+    "floor.layout.guidepath": "Box Guidepath Point2",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
     "floor.layout.layout": "Layout",
@@ -173,9 +156,9 @@ HOMES = {
     "engine.simulation.run": "Run steady_from",
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
+    "pipeline": "Project",
     "film.picture": "Picture",
     "film.shot": "Shot",
-    "pipeline": "Project",
 }
 """The names by the modules that define them, in the order of the house."""
 

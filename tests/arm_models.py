@@ -7,13 +7,13 @@ from functools import cache
 import mujoco
 import numpy as np
 
-from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import Clearance
 from factory.apps.arms.read import MODELS, chain_of, read_chain
 from factory.apps.arms.slowness import enforce_limits
+from factory.support.arrays import Array, Index, Truth
 
 PACE = WayLimits()
 

@@ -29,7 +29,7 @@ from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 
 When = float | Literal["end"]
 

@@ -19,7 +19,7 @@ from factory.film.ink import (
     fitted,
     width,
 )
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 from factory.theory.nets.verdict import listing
 
 BAR = 0.82

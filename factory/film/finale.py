@@ -17,7 +17,7 @@ from factory.film.picture import orbit
 from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 
 LASTS = 2.0
 """How long a finished product is shown [s]."""

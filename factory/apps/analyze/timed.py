@@ -9,10 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import NONE, Array, MarkedNet, PetriNet, Place, Timing, steady_from
+from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits
 from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
 from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.support.arrays import Array
 from factory.theory.nets.earliest import earliest_firings
 
 

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from factory.api import Array, Factory, Layout, Product
+from factory.api import Factory, Layout, Product
 from factory.apps.arms.body import STEM
 from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
@@ -19,6 +19,7 @@ from factory.apps.arms.rises import Rise
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
 from factory.floor.geometry.turning import about_vertical, axis_of, presented
 from factory.floor.layout.dimensions import PAYLOAD
+from factory.support.arrays import Array
 
 ABOVE = 0.018
 """How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""

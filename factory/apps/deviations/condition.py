@@ -12,16 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import (
-    Array,
-    Diagnostic,
-    Index,
-    InputError,
-    Limits,
-    Operation,
-    did_you_mean,
-)
+from factory.api import Diagnostic, InputError, Limits, Operation, did_you_mean
 from factory.apps.deviations.deviation import Deviation, Vector
+from factory.support.arrays import Array, Index
 
 if TYPE_CHECKING:
     from factory.api import MujocoWorld, Simulation

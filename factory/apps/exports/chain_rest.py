@@ -11,7 +11,7 @@ from factory.api import Layout, names
 from factory.floor.layout.starting import start_positions
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Layout, Point2, Solid
+from factory.api import Box, Layout, Point2, Solid
 from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.floor.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Box, Extent
+from factory.floor.layout.layout import Extent
 from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import tiles_of
 from factory.theory.problem.robot_bodies import ARM_WIDTH

@@ -22,11 +22,11 @@ from factory.api import Layout, Model, names
 from factory.apps.drawing.markup import quoteattr
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.engine.mjcf.driving import GRAVITY
-from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.feeders import SLIDER_MASS
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.starting import start_positions
+from factory.support.xml_writer import add, number, numbers
 
 LAW = ("kp", "kv", "forcerange")
 """What an actuator of a run and the written one have in common."""

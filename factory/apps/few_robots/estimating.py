@@ -7,7 +7,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
-from factory.api import Allowance, Factory, Operation, Pace, Plan, Product, Project, payload_boxes
+from factory.api import (
+    Allowance,
+    Box,
+    Factory,
+    Operation,
+    Pace,
+    Plan,
+    Product,
+    Project,
+    payload_boxes,
+)
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
@@ -16,7 +26,6 @@ from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_
 from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
 from factory.floor.geometry.fused_bodies import repeated
-from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hands.misses import NoGrip
 from factory.theory.compiler.expanding import expand
 from factory.theory.problem.plan import THIRD

@@ -18,9 +18,8 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.api import PAG, Assembly, Pace, Template
+from factory.api import PAG, Assembly, Box, Pace, Template
 from factory.apps.few_robots.lines import Admitted
-from factory.floor.layout.guidepath import Box
 from factory.floor.mating.findings import BLOCKED, NO_DEEPER
 from factory.theory.compiler.expanding import Node, expand
 from factory.theory.problem.plan import THIRD

@@ -12,10 +12,9 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Catalogue, Factory, Pace, Plan, Product, marked
+from factory.api import Box, Catalogue, Factory, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
-from factory.floor.layout.guidepath import Box
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.findings import STRICT
 from factory.floor.mating.mating import UPRIGHT, levels_of

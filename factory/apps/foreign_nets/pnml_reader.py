@@ -22,10 +22,10 @@ from factory.api import (
     Position,
     Transition,
     TransitionId,
-    collector_paused,
     did_you_mean,
     read_text,
 )
+from factory.support.collector import collector_paused
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
 from factory.theory.nets.composition import compose

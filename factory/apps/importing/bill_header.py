@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 from factory.api import Position, did_you_mean
 from factory.apps.importing.draft import ImportFaults
-from factory.theory.lang.source import quoted
-from factory.theory.lang.words import UNITS
+from factory.support.decimals import UNITS
+from factory.support.texts import quoted
 
 TITLES: Mapping[str, str] = MappingProxyType(
     {

@@ -12,7 +12,7 @@ from typing import Literal
 
 from factory.api import PAG, Assembly, Diagnostic, InputError, Position, Product
 from factory.floor.geometry.overlapping import overlaps_of
-from factory.theory.lang.source import where
+from factory.support.texts import where
 from factory.theory.lang.words import is_label
 from factory.theory.problem.pag import RESERVED, AllowedOverlap, Parameter
 

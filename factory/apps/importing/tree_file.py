@@ -18,8 +18,8 @@ from factory.apps.importing.draft import (
     too_many,
 )
 from factory.apps.importing.part_maker import PartMaker, Placement
+from factory.support.texts import quoted
 from factory.theory.lang.operations import MESHES, Signature
-from factory.theory.lang.source import quoted
 from factory.theory.lang.values import GEOMETRY, Kind
 from factory.theory.problem.pag import SHAPES, Parameter, Value
 

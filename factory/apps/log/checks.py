@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Demand, value_of
+from factory.api import Demand
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
@@ -18,7 +18,7 @@ from factory.engine.record.verdict import check_kept_figures
 from factory.floor.layout.saved import LayoutTable
 from factory.support.bounds import WorldName
 from factory.support.settings import AUTO
-from factory.support.tables import LARGE
+from factory.support.tables import LARGE, value_of
 
 HEADER = "header"
 """The figure that is the digest of the header of a log."""

@@ -20,18 +20,14 @@ from factory.api import (
     Position,
     Project,
     Settings,
-    misfit,
-    read_bytes,
     read_text,
-    table_of,
     usage_error,
-    value_of,
 )
 from factory.apps.log.cell_table import cell_in
 from factory.apps.log.project_table import ProjectTable, project_of, project_table
 from factory.floor.layout.saved import LAID_FOR, LayoutTable
-from factory.support.files import MESH
-from factory.support.tables import MISFITS
+from factory.support.files import MESH, read_bytes
+from factory.support.tables import MISFITS, misfit, table_of, value_of
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import (
-    Array,
     Diagnostic,
     Event,
     FactoryError,
@@ -28,7 +27,6 @@ from factory.api import (
     Recorder,
     State,
     Undone,
-    table_of,
 )
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
 from factory.apps.log.cell_table import cell_in
@@ -39,9 +37,11 @@ from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
 from factory.engine.record.verdict import kept_figures
 from factory.floor.layout.saved import LayoutTable
+from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.files import unwritten
 from factory.support.settings import AUTO
+from factory.support.tables import table_of
 from factory.support.version import release
 
 if TYPE_CHECKING:

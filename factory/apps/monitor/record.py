@@ -19,7 +19,6 @@ from factory.api import (
     Observation,
     Report,
     RunVerdict,
-    value_of,
 )
 from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, project_of, settings_of
@@ -33,6 +32,7 @@ from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
 from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import judged
+from factory.support.tables import value_of
 from factory.theory.nets.replay import replay
 from factory.theory.plant.demand import Word
 

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from factory.api import Array, Indices
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
@@ -27,6 +26,7 @@ from factory.floor.mating.mating import AMPLE
 from factory.floor.mating.meetings import Meeting, Meetings
 from factory.floor.mating.overlaps import Finder, Overlaps
 from factory.floor.mating.paths import TOLERANCE
+from factory.support.arrays import Array, Indices
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
 """Levels of blocking: none; the parts scrape, or stay drawn into each other; parts that were drawn

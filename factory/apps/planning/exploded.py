@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Indices, Product, Solid
+from factory.api import Product, Solid
 from factory.apps.planning.exploding import Explosion
 from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.source import surface
@@ -18,6 +18,7 @@ from factory.film.smoothing import smooth
 from factory.film.video import VideoFile, check_output
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.sight import View, fit, towards
+from factory.support.arrays import Array, Indices
 
 FPS = 15.0
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Indices
 from factory.apps.planning.cannot import Interlock
 from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.parts import InPlace
@@ -17,6 +16,7 @@ from factory.film.picture import Size
 from factory.film.reel import write_still
 from factory.film.video import check_output
 from factory.floor.geometry.sight import fit, towards
+from factory.support.arrays import Array, Indices
 
 SIZE: Size = (1280, 720)
 """Of the picture, without the names below it."""

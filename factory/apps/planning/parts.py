@@ -11,22 +11,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import (
-    PAG,
-    Array,
-    Assembly,
-    Diagnostic,
-    Indices,
-    InputError,
-    Mesh,
-    Product,
-    Solid,
-    listing,
-)
+from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid, listing
 from factory.floor.geometry.decomposition import FULL
-from factory.floor.geometry.meshes import is_closed
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
+from factory.support.arrays import Array, Indices
+from factory.support.triangles import is_closed
 from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"

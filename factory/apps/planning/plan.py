@@ -12,7 +12,6 @@ import numpy as np
 
 from factory.api import (
     Allowance,
-    Array,
     Diagnostic,
     InputError,
     Pace,
@@ -56,6 +55,7 @@ from factory.apps.planning.subsets import MOST, stances
 from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
 from factory.pipeline import all_templates
+from factory.support.arrays import Array
 
 DECOMPOSING = "decomposing parts into convex bodies"
 """The name of the stage after a tree is found: layouts and runs need these bodies, ways do not."""

@@ -14,11 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Layout, Mode
+from factory.api import Layout, Mode
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.presence import Span
 from factory.floor.layout.staying import Staying, Sweep
+from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3

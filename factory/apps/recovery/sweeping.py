@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Array, Index, Layout
+from factory.api import Layout
 from factory.floor.layout.sweeping import APART
 from factory.floor.layout.sweeps import piles, regions
+from factory.support.arrays import Array, Index
 from factory.theory.control.mode import ROUNDING
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Factory, Hand, Layout, Operation, Truth
+from factory.api import Factory, Hand, Layout, Operation
 from factory.floor.layout.dimensions import FINGER, Clearance
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
@@ -16,6 +16,7 @@ from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import widths
 from factory.floor.layout.hands.surfaces import Way, swept
+from factory.support.arrays import Array, Truth
 
 
 @dataclass(frozen=True, slots=True)

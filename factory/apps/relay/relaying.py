@@ -21,7 +21,6 @@ from factory.api import (
     Settings,
     certified,
     certify,
-    collector_paused,
     load_catalogue,
     pace,
 )
@@ -32,6 +31,7 @@ from factory.floor.layout.durations import cycle_of, gear_times
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
 from factory.pipeline import all_templates
+from factory.support.collector import collector_paused
 
 WITHIN = 1.05
 """Where no cycle time is asked for: that of the most relays there can be, times this."""

@@ -11,7 +11,7 @@ from factory.api import Failing, Failures
 from factory.apps.drawing.tables import table
 from factory.apps.report.recording import Recording
 from factory.engine.record.failures import Death, deaths
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 
 LEGEND = (
     "Robots over time: undone operations are hatched; in a band a robot stands still, in a dark one"

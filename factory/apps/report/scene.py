@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Factory, Geoms, Operation, Replica, mujoco, names, rotation
+from factory.api import Factory, Geoms, Operation, Replica, names, rotation
 from factory.apps.drawing.canvas import hexadecimal
 from factory.apps.exports.geoms import triangles
 from factory.film.dress import dressed
-from factory.floor.geometry.pieces import joined
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
+from factory.support.triangles import joined
 
 VIEW = (-0.62, -1.0, 0.78)
 """Where the camera stands, seen from the factory."""

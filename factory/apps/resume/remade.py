@@ -21,8 +21,6 @@ from factory.api import (
     RunRequest,
     Simulation,
     State,
-    misfit,
-    value_of,
 )
 from factory.apps.log import Log
 from factory.apps.log.checks import HEADER
@@ -31,6 +29,7 @@ from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
 from factory.engine.record.verdict import FAULTS, RESERVATIONS
+from factory.support.tables import misfit, value_of
 
 TAG = re.compile(r"<[^>]+>")
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from factory.api import PAG, Assembly, read_bytes
+from factory.api import PAG, Assembly
 from factory.support.cache import digest
-from factory.support.files import MESH
+from factory.support.files import MESH, read_bytes
 from factory.theory.problem.pag import Parameter, Value
 
 Shift = tuple[float, float, float]

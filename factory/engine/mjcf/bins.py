@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, add_station
+from factory.engine.mjcf.elements import add_station
 from factory.floor.layout.bins import PLATE, SILL, TOP, Bin
 from factory.floor.layout.layout import Layout
+from factory.support.xml_writer import add
 
 DEEP = 0.1
 """So far below the floor a bin's bottom goes on, unseen: nothing falls through it between two

@@ -24,7 +24,6 @@ from factory.engine.mjcf.driving import (
     drive_for,
     driven_axes,
 )
-from factory.engine.mjcf.elements import fill
 from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.engine.mjcf.insets import Insets, insets_of
 from factory.engine.mjcf.jaws import add_jaws
@@ -42,6 +41,7 @@ from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
+from factory.support.xml_writer import fill
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.approaches import Pair
 from factory.theory.plant.factory import Factory

@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.insets import Insets
 from factory.engine.mjcf.mesh_files import inset_file, inset_name, mesh_file, piece_files
 from factory.engine.mjcf.names import part, piece
@@ -18,6 +17,7 @@ from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout, Point2
 from factory.support.arrays import Array
+from factory.support.xml_writer import add, exact, numbers
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""

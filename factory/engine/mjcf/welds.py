@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, numbers
 from factory.engine.mjcf.grips import grips_of, seen_from, turned
 from factory.engine.mjcf.parts import parked_at, place_in
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside
@@ -15,6 +14,7 @@ from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
+from factory.support.xml_writer import add, numbers
 
 
 def add_welds(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry.decimation import ENOUGH, Coarse, decimated
-from factory.floor.geometry.meshes import Mesh, hull_of, is_closed, volume_of
+from factory.floor.geometry.meshes import Mesh, hull_of
 from factory.floor.geometry.overlap import (
     Common,
     bounded,
@@ -36,6 +36,7 @@ from factory.floor.mating.bodies import ConvexBodies
 from factory.floor.mating.depth import solid_hull
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.support.arrays import Array, Indices
+from factory.support.triangles import is_closed, volume_of
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""

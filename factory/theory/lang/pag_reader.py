@@ -18,12 +18,14 @@ from itertools import chain, product, repeat
 from lark import Token
 
 from factory.support.collector import collector_paused
+from factory.support.decimals import UNITS, number
 from factory.support.errors import did_you_mean, usage_error
 from factory.support.guard import reading
+from factory.support.texts import Findings, quoted, source_of
 from factory.theory.lang.mixes import mix_of
 from factory.theory.lang.operations import AssemblyReader, signature
 from factory.theory.lang.pag_syntax import read_statements
-from factory.theory.lang.source import STDIN, Findings, quoted, read_text, source_of
+from factory.theory.lang.source import STDIN, read_text
 from factory.theory.lang.statements import (
     COPIES,
     CopiedLabel,
@@ -34,7 +36,6 @@ from factory.theory.lang.statements import (
     labels_of,
 )
 from factory.theory.lang.tree import TreeCheck
-from factory.theory.lang.words import UNITS, number
 from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.theory.problem.template import Template
 

@@ -16,7 +16,8 @@ from types import MappingProxyType
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.extensions import extension_folders
 from factory.support.resources import templates_folder
-from factory.theory.lang.source import Findings, quoted, read_text, source_of
+from factory.support.texts import Findings, quoted, source_of
+from factory.theory.lang.source import read_text
 from factory.theory.lang.template_checks import TemplateMaker
 from factory.theory.lang.template_syntax import read_clauses
 from factory.theory.problem.pag import NOPART

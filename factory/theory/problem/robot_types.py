@@ -11,7 +11,7 @@ from types import MappingProxyType
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.extensions import extension_folders
 from factory.support.resources import mjcf_folder
-from factory.support.user_defaults import read_toml
+from factory.support.toml_files import read_toml
 from factory.theory.problem.robot_bodies import RobotBody
 from factory.theory.problem.robot_reader import read_body
 

@@ -92,10 +92,11 @@ def export(
 
     FILE is a PAG, a net in PNML, or a LOG of `run --log`.
     """
-    from factory.api import Project, write_all
+    from factory.api import Project
     from factory.apps.exports.writing import check_taken, exporter, read_source, takes_folder
     from factory.apps.exports.writing import export as exported
     from factory.apps.log import Log
+    from factory.support.files import write_all
 
     chosen = exporter(form, of, exporting)
     piped, output = output == STDOUT, None if output == STDOUT else output

@@ -143,10 +143,9 @@ def _written(
 ) -> tuple[Sequence[str | None], list[Path]]:
     """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
-    from factory.api import write_all
     from factory.apps.pareto.front import commands_of, point_files
     from factory.apps.pareto.page import floor_plans, front_page
-    from factory.support.files import own_names
+    from factory.support.files import own_names, write_all
 
     if folder is None:
         return [None] * len(front.points), []

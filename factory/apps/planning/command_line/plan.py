@@ -23,11 +23,12 @@ from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
-    from factory.api import Array, Project
+    from factory.api import Project
     from factory.apps.planning.parts import InPlace
     from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.apps.planning.searching import Aim
     from factory.floor.geometry.overlapping import Overlapping
+    from factory.support.arrays import Array
     from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")

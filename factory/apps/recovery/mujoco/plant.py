@@ -7,7 +7,7 @@ from math import radians
 
 import numpy as np
 
-from factory.api import NOPART, Array, Factory, Index, MujocoWorld, Operation
+from factory.api import NOPART, Factory, MujocoWorld, Operation
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
@@ -18,6 +18,7 @@ from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.engine.record.verdict import MOST
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.floor.layout.bins import Bin
+from factory.support.arrays import Array, Index
 
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""
