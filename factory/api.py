@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.layout import Layout as Layout
     from factory.floor.layout.request import Ground as Ground
     from factory.floor.layout.shapes import payload_boxes as payload_boxes
+    from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
     from factory.support.bounds import Allowance as Allowance
@@ -97,7 +98,6 @@ if TYPE_CHECKING:
     from factory.theory.problem.pag import Assembly as Assembly
     from factory.theory.problem.plan import Plan as Plan
     from factory.theory.problem.robot_types import Catalogue as Catalogue
-    from factory.theory.problem.robot_types import load_catalogue as load_catalogue
     from factory.theory.problem.template import Template as Template
 
 HOMES = {
@@ -109,7 +109,7 @@ HOMES = {
     "theory.problem.ids": "PlaceId TransitionId",
     "theory.problem.pag": "Assembly NOPART PAG",
     "theory.problem.plan": "Plan",
-    "theory.problem.robot_types": "Catalogue load_catalogue",
+    "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
     "theory.lang.pag_reader": "load_pag",
     "theory.lang.source": "read_text",
@@ -128,6 +128,7 @@ HOMES = {
     "theory.plant.robot": "Robot",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid rotation",
+    "floor.robots.catalogue": "load_catalogue",
     "floor.layout.certificate": "Certificate",
     "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",

@@ -158,7 +158,7 @@ FLOORS = (
     ("theory.lang", "theory.nets", "theory.control"),
     ("theory.plant",),
     ("theory.compiler",),
-    ("floor.geometry",),
+    ("floor.geometry", "floor.robots"),
     ("floor.mating",),
     ("floor.layout",),
     ("floor.modes",),

@@ -10,10 +10,11 @@ from hypothesis import given
 from factory.floor.layout.crowding import separation
 from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.sweeps import piles
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.problem.pag import PAG
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 from tests.examples import with_hands
 from tests.pag_texts import PAPER, TEMPLATES, compiled
 from tests.strategies import pags

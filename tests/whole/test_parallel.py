@@ -16,13 +16,13 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.cycle_time import cycle_time
 from factory.floor.layout.bounds import cycle_time_bound
 from factory.floor.layout.durations import Pace, cycle_of
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import Project, all_templates, read
 from factory.support.errors import InputError
 from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG, Parameter
-from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.fold_values import branched, plain, simulated_cycle, table_of
 from tests.slow import slow_but

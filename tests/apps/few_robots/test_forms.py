@@ -34,6 +34,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.mating.mating import judged
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import Project, read
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.resources import templates_folder
@@ -47,7 +48,6 @@ from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import THIRD, Plan
-from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
 from tests.pag_values import TEMPLATES as OWN
