@@ -18,10 +18,11 @@ from factory.apps.revise.pins import StayingRobot
 from factory.apps.revise.revision import revised
 from factory.engine.timing.timed import pace
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import all_templates, read
+from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.pag import PAG, Assembly, Parameter
 
 KINDS = ("change", "add", "drop", "swap", "tool", "rename")

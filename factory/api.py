@@ -72,6 +72,7 @@ if TYPE_CHECKING:
     from factory.theory.control.mode import Mode as Mode
     from factory.theory.lang.pag_reader import load_pag as load_pag
     from factory.theory.lang.source import read_text as read_text
+    from factory.theory.lang.template_reader import all_templates as all_templates
     from factory.theory.lang.writer import write_pag as write_pag
     from factory.theory.nets.gears import GearNet as GearNet
     from factory.theory.nets.marked import NONE as NONE
@@ -114,6 +115,7 @@ HOMES = {
     "theory.lang.pag_reader": "load_pag",
     "theory.lang.source": "read_text",
     "theory.lang.writer": "write_pag",
+    "theory.lang.template_reader": "all_templates",
     "theory.nets.gears": "GearNet",
     "theory.nets.marked": "MarkedNet NONE marked token_free",
     "theory.nets.petri": "Marking PetriNet Place Transition",

@@ -22,8 +22,7 @@ from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.expanding import expand
 from factory.theory.compiler.turning import check_shapes, placed
 from factory.theory.lang.pag_reader import load_pag
-from factory.theory.lang.template_reader import all_templates as all_templates
-from factory.theory.lang.template_reader import is_shipped
+from factory.theory.lang.template_reader import all_templates, is_shipped
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG

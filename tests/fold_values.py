@@ -15,11 +15,12 @@ from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
 from factory.floor.mating.mating import judged
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.folding import sides_of
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import marked
 from factory.theory.plant.approaches import Approach

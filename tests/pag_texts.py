@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from factory.floor.layout.layout import Layout
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang import read_pag, read_template
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.robot_types import Catalogue
 

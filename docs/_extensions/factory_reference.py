@@ -22,11 +22,11 @@ from factory.apps.exports import exporters
 from factory.commands import cli
 from factory.commands import commands as every_command
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import all_templates
 from factory.support.explanations import codes, explain
 from factory.support.resources import mjcf_folder
 from factory.support.settings import RANGES, Settings
 from factory.support.user_defaults import OPTIONS
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.values import WRITTEN
 
 if TYPE_CHECKING:

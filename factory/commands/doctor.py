@@ -110,7 +110,7 @@ def _extra(name: str) -> Finding:
 def _assets() -> Finding:
     try:
         from factory.floor.robots.catalogue import load_catalogue
-        from factory.pipeline import all_templates
+        from factory.theory.lang.template_reader import all_templates
 
         counts = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
         return Finding("assets", True, counts)

@@ -47,9 +47,9 @@ def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
     from factory.apps.log import is_log, read_log
     from factory.apps.log.plan_file import read_plan
     from factory.apps.log.project_table import factory_of, project_of
-    from factory.pipeline import all_templates
     from factory.support.files import is_plan
     from factory.theory.lang import load_pag
+    from factory.theory.lang.template_reader import all_templates
 
     try:
         if file is None:

@@ -17,7 +17,7 @@ from factory.support.console import emit, say, table
 def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
     """List the available operations and robot types."""
     from factory.floor.robots.catalogue import load_catalogue
-    from factory.pipeline import all_templates
+    from factory.theory.lang.template_reader import all_templates
     from factory.theory.lang.writer import write_template
 
     operations, catalogue = all_templates(folders), load_catalogue()

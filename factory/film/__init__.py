@@ -13,7 +13,7 @@
 
 from factory.film.film import Film, Still
 from factory.film.picture import Picture, camera_named, panels_named
-from factory.film.video import check_output
+from factory.support.pictures.video import check_output
 
 __all__ = [
     "Film",

@@ -9,6 +9,7 @@ beside `factory.api`. They import no module but such ones.
   `mesh_bodies.py`.
 * Files: `files.py`, `guard.py`, `claim.py`, `cache.py`, `resources.py`; their contents:
   `tables.py`, `toml_files.py`, `xml_tree.py`.
+* Pictures and films: `pictures/`, from `ink.py` to `video.py`.
 * What a user sets: `settings.py` (`Settings`), `user_defaults.py`, `bounds.py`.
 * The engine and GL: `engine.py`, `gl.py`.
 * What apps and other packages give: `apps.py`, `extensions.py`.

@@ -22,8 +22,8 @@ from factory.floor.mating.drawn import DrawnWays
 from factory.floor.mating.meetings import Meeting, Meetings
 from factory.floor.mating.overlaps import Finder
 from factory.floor.mating.paths import CLEAR, TOLERANCE, Depths
-from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 
 TEXT = """
 root = all;

@@ -20,9 +20,9 @@ from factory.api import HOMES
 from factory.apps.exports import exporters
 from factory.commands import commands
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import all_templates
 from factory.support.explanations import codes
 from factory.support.settings import RANGES
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.values import GEOMETRY
 from tests.command_line import Terminal
 from tests.paths import ROOT

@@ -27,11 +27,11 @@ from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER, STRICT, Mating, M
 from factory.floor.mating.mating import judged as without_lifts
 from factory.floor.mating.mating import matings
 from factory.floor.mating.paths import LAST, NEAR, depths_of, sought
-from factory.pipeline import all_templates
 from factory.support.errors import Diagnostic
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang import read_pag
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.pag import PAG, AllowedOverlap
 from tests.command_line import Terminal
 from tests.pag_values import factory_of

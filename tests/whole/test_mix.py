@@ -12,10 +12,11 @@ import pytest
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
 from factory.floor.geometry.product import product_geometry
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
 from factory.support.errors import InputError
 from factory.theory.compiler.mixing import even, orders
 from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.writer import write_pag
 from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify

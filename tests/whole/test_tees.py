@@ -17,10 +17,11 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.layout import Layout
 from factory.floor.robots.catalogue import load_catalogue
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.theory.compiler.tees import on_stems
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Parameter
 from factory.theory.problem.template import Template

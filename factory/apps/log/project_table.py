@@ -26,13 +26,13 @@ from factory.api import (
     Project,
     Settings,
     Template,
+    all_templates,
     load_catalogue,
     write_pag,
 )
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
 from factory.floor.layout.saved import LayoutTable
-from factory.pipeline import all_templates
 from factory.support.tables import MISFITS, misfit, table_of, value_of
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag

@@ -10,11 +10,11 @@ from factory.api import Replica
 from factory.engine.mjcf.model import SKELETON
 from factory.engine.mjcf.scene import FILL, KEY
 from factory.film.painter import Renderer
-from factory.film.picture import Size
-from factory.floor.geometry.sight import Framing
 from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
 from factory.support.gl import probe
+from factory.support.pictures.sight import Framing
+from factory.support.pictures.video import Size
 from factory.support.resource import Closing
 
 FLOOR = 20.0

@@ -18,6 +18,7 @@ from factory.api import (
     Project,
     Settings,
     Template,
+    all_templates,
     did_you_mean,
 )
 from factory.apps.planning.blocking import (
@@ -54,7 +55,6 @@ from factory.apps.planning.standing import feet
 from factory.apps.planning.subsets import MOST, stances
 from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
-from factory.pipeline import all_templates
 from factory.support.arrays import Array
 
 DECOMPOSING = "decomposing parts into convex bodies"

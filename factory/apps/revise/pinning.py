@@ -27,7 +27,6 @@ from factory.floor.layout.certificate import Fault
 from factory.floor.layout.crowding import crowding_faults
 from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.durations import cycle_of
 from factory.floor.layout.layout import branch_of, carriers
 from factory.floor.layout.optimising import arrange, shape_of
 from factory.floor.layout.packing import Task
@@ -295,5 +294,5 @@ class Pinning:
         lacking = sum(fault.lacking or JAM for fault in faults)
         displaced = len(self.pins.ends) - len(self.pins.in_place(layout)[1])
         score = lacking + WEIGHT * displaced + LENGTH * layout.guidepath_length
-        score += TIME * cycle_of(layout, self.task.pace)
+        score += TIME * self.task.pace.cycle_of(layout)
         return _Seen(stretch, layout, faults, lacking, score)

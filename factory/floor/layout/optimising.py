@@ -20,7 +20,7 @@ from factory.floor.geometry.solids import Product
 from factory.floor.layout.certificate import Region
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.durations import Pace, cycle_of, gear_times
+from factory.floor.layout.durations import Pace
 from factory.floor.layout.guidepath import Box, Point2, hull
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import bare
@@ -95,14 +95,14 @@ def optimised(
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)
     best = first_feasible(factory, product, c, wide, hands)
-    times = gear_times(best, pace)
-    least = _score(best, cycle_of(best, pace), floor)
+    times = pace.gear_times(best)
+    least = _score(best, pace.cycle_of(best), floor)
     for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):
         weights = task.weights if number < UNWEIGHTED else _weights(times)
         way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
         layout = _packed(way, product, payloads)
-        gear_seconds = gear_times(layout, pace)
-        score = _score(layout, cycle_of(layout, pace), floor)
+        gear_seconds = pace.gear_times(layout)
+        score = _score(layout, pace.cycle_of(layout), floor)
         if score < least:
             best, times, least = layout, gear_seconds, score
     return best

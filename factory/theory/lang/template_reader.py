@@ -46,8 +46,13 @@ def is_shipped(template: Template) -> bool:
 
 
 def all_templates(folders: Sequence[Folder] = ()) -> Mapping[str, Template]:
-    """The templates of the user's folders, of entry points and the shipped ones. Raises
-    InputError."""
+    """The templates of the user's folders, of entry points and the shipped ones.
+
+    Args:
+        folders: those of the user, searched first.
+
+    Raises InputError.
+    """
     for folder in folders:
         if not Path(folder).is_dir():
             message = f"the templates folder '{folder}' is no directory"

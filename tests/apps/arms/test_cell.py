@@ -24,8 +24,9 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.request import Ground
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.verify import verify
 from tests.apps.arms.test_read import BOX, OWN, own
 from tests.arm_cells import SMALL, cell, refusal

@@ -25,9 +25,9 @@ from factory.apps.arms.legs import NoWay, transfer
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.scene import FAR, OWN, Scene, StandingBox
 from factory.apps.arms.sharing import STEPS, SweptArm
-from factory.pipeline import all_templates
 from factory.support.arrays import Array, Index
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from tests.arm_cells import chains, project, refusal
 from tests.arm_models import (
     ball,

@@ -22,9 +22,10 @@ from factory.apps.arms.orders import PrivateParts, private_parts
 from factory.apps.arms.rises import BEND, Rise
 from factory.apps.arms.scene import Scene
 from factory.floor.geometry.solids import Solid
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.support.arrays import Array
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from tests.arm_cells import SMALL, chains, project, refusal
 from tests.arm_models import PACE, random_way, shipped
 from tests.paths import EXAMPLES, ROOT

@@ -21,8 +21,8 @@ from factory.apps.importing.scene_file import read_scene
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.floor.geometry import glb_reader
 from factory.floor.geometry.mesh_file import UnreadableMesh
-from factory.pipeline import all_templates
 from factory.support.errors import FactoryError
+from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4").tobytes()

@@ -66,9 +66,9 @@ def import_(
     SOURCE is an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of materials with
     levels (.csv), or a folder with one of these.
     """
+    from factory.api import all_templates
     from factory.apps.importing import Options, import_product
     from factory.apps.importing.draft import Mates
-    from factory.pipeline import all_templates
     from factory.support.files import own_names, write_all
 
     for folder, option in ((library, "--library"), (meshes, "--meshes")):

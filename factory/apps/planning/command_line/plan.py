@@ -112,12 +112,13 @@ def plan(
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored; all parts are where they are in the finished product.
     """
+    from factory.api import all_templates
     from factory.apps.few_robots.sharing import with_lines
     from factory.apps.importing.draft import file_stem
     from factory.apps.planning.outcome import write_planned
     from factory.apps.planning.plan import CannotAssemble, PlanOptions
     from factory.apps.planning.source import SourceOptions, read_source
-    from factory.pipeline import all_templates, read
+    from factory.pipeline import read
     from factory.support.files import own_names
     from factory.theory.lang.overlaps import overlaps_in
 
