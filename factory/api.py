@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.layout import Layout as Layout
     from factory.floor.layout.request import Ground as Ground
     from factory.floor.layout.shapes import payload_boxes as payload_boxes
+    from factory.floor.mating.finder import Finder as Finder
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
@@ -131,6 +132,7 @@ HOMES = {
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid rotation",
     "floor.robots.catalogue": "load_catalogue",
+    "floor.mating.finder": "Finder",
     "floor.layout.certificate": "Certificate",
     "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",

@@ -20,7 +20,7 @@ from typing import Literal
 
 from factory.api import PAG, Assembly, Box, Pace, Template
 from factory.apps.few_robots.lines import Admitted
-from factory.floor.mating.findings import BLOCKED, NO_DEEPER
+from factory.floor.mating.findings import Level
 from factory.theory.compiler.expanding import Node, expand
 from factory.theory.problem.plan import THIRD
 
@@ -228,7 +228,7 @@ def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int
     if len(node.inputs) > 2:
         lowers = lowers[-1:]
     level = max(admits.slides[axis], *lowers)
-    return int(level == BLOCKED), int(level < NO_DEEPER)
+    return int(level == Level.BLOCKED), int(level < Level.NO_DEEPER)
 
 
 def joins(node: Assembly) -> Iterator[str]:
