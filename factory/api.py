@@ -39,13 +39,17 @@ if TYPE_CHECKING:
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
     from factory.floor.geometry.meshes import Mesh as Mesh
+    from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
     from factory.floor.geometry.solids import rotation as rotation
+    from factory.floor.layout.branches import carriers as carriers
     from factory.floor.layout.certificate import Certificate as Certificate
     from factory.floor.layout.clearance import certify as certify
+    from factory.floor.layout.dimensions import Clearance as Clearance
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.embedding import certified as certified
+    from factory.floor.layout.exclusions import coordinated as coordinated
     from factory.floor.layout.guidepath import Box as Box
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.guidepath import Point2 as Point2
@@ -53,12 +57,16 @@ if TYPE_CHECKING:
     from factory.floor.layout.hands.hand import Hand as Hand
     from factory.floor.layout.layout import Layout as Layout
     from factory.floor.layout.request import Ground as Ground
+    from factory.floor.layout.saved import LayoutTable as LayoutTable
     from factory.floor.layout.shapes import payload_boxes as payload_boxes
+    from factory.floor.layout.starting import start_positions as start_positions
+    from factory.floor.layout.sweeps import regions as regions
     from factory.floor.mating.finder import Finder as Finder
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
     from factory.support.bounds import Allowance as Allowance
+    from factory.support.bounds import WorldName as WorldName
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
@@ -88,6 +96,7 @@ if TYPE_CHECKING:
     from factory.theory.nets.undone import Undone as Undone
     from factory.theory.nets.verdict import Verdict as Verdict
     from factory.theory.nets.verdict import listing as listing
+    from factory.theory.nets.verify import proved as proved
     from factory.theory.nets.verify import verify as verify
     from factory.theory.plant.demand import Demand as Demand
     from factory.theory.plant.factory import Factory as Factory
@@ -106,7 +115,7 @@ HOMES = {
     "support.errors": "Diagnostic FactoryError InputError Position RunError "
     "did_you_mean usage_error",
     "support.settings": "Settings",
-    "support.bounds": "Allowance",
+    "support.bounds": "Allowance WorldName",
     "support.apps": "App",
     "theory.problem.ids": "PlaceId TransitionId",
     "theory.problem.pag": "Assembly NOPART PAG",
@@ -122,7 +131,7 @@ HOMES = {
     "theory.nets.petri": "Marking PetriNet Place Transition",
     "theory.nets.undone": "Entry Undone",
     "theory.nets.verdict": "Verdict listing",
-    "theory.nets.verify": "verify",
+    "theory.nets.verify": "proved verify",
     "theory.control.laws": "Setting navigation",
     "theory.control.mode": "Limits Mode",
     "theory.plant.demand": "Demand",
@@ -131,6 +140,7 @@ HOMES = {
     "theory.plant.robot": "Robot",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid rotation",
+    "floor.geometry.product": "product_geometry",
     "floor.robots.catalogue": "load_catalogue",
     "floor.mating.finder": "Finder",
     "floor.layout.certificate": "Certificate",
@@ -143,6 +153,12 @@ HOMES = {
     "floor.layout.layout": "Layout",
     "floor.layout.request": "Ground",
     "floor.layout.shapes": "payload_boxes",
+    "floor.layout.dimensions": "Clearance",
+    "floor.layout.exclusions": "coordinated",
+    "floor.layout.saved": "LayoutTable",
+    "floor.layout.starting": "start_positions",
+    "floor.layout.sweeps": "regions",
+    "floor.layout.branches": "carriers",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",

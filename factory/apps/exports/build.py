@@ -7,7 +7,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from factory.api import Certificate, Model, Project, RunError, Verdict, certify, physical_model
+from factory.api import (
+    Certificate,
+    Model,
+    Project,
+    RunError,
+    Verdict,
+    certify,
+    coordinated,
+    physical_model,
+)
 from factory.apps.drawing.tables import titled
 from factory.apps.exports import arm_program, joints
 from factory.apps.exports.binary import beside, kept, key_of, packed, seal_of, sealed
@@ -21,7 +30,6 @@ from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names, write_all
 from factory.theory.plant.programs import program_of

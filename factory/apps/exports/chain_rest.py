@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import Layout, names
-from factory.floor.layout.starting import start_positions
+from factory.api import Layout, names, start_positions
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco

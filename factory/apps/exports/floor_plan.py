@@ -8,13 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Box, Layout, Point2, Solid
+from factory.api import Box, Layout, Point2, Solid, regions
 from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.floor.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.floor.layout.feeding import feeder_of
+from factory.floor.layout.guidepath import Extent
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Extent
-from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import tiles_of
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
@@ -112,7 +111,7 @@ def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
 
 def _sweeps(layout: Layout) -> Iterator[Flat]:
     """Regions swept by payloads: the coupled ones first, so that those of every mode lie on top."""
-    swept = regions(layout, piles(layout.factory, layout.product))
+    swept = regions(layout)
     payloads = [region for region in swept if region.kind == PAYLOAD_BODY]
     for style in ("coupled", "uncoupled"):
         boxes = (r.box for r in payloads if (r.mode == ALWAYS) == (style == "uncoupled"))

@@ -18,14 +18,13 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.api import Layout, Model, names
+from factory.api import Layout, Model, names, start_positions
 from factory.apps.drawing.markup import quoteattr
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.feeders import SLIDER_MASS
 from factory.engine.mjcf.outfeed import SHUTTER_MASS
 from factory.floor.layout.feeding import outlets_of
-from factory.floor.layout.starting import start_positions
 from factory.support.xml_writer import add, number, numbers
 
 LAW = ("kp", "kv", "forcerange")

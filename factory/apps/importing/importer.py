@@ -84,8 +84,8 @@ def import_product(
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
     """An LDraw model in which parts may overlap as much as drawings without fits do."""
+    from factory.api import product_geometry
     from factory.apps.importing.draft import everywhere
-    from factory.floor.geometry.product import product_geometry
 
     try:
         return replace(pag, allowed=everywhere(product_geometry(pag, files)))

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Demand
+from factory.api import Demand, LayoutTable, WorldName
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import check_kept_figures
-from factory.floor.layout.saved import LayoutTable
-from factory.support.bounds import WorldName
 from factory.support.settings import AUTO
 from factory.support.tables import LARGE, value_of
 

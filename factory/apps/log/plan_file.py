@@ -17,6 +17,7 @@ from factory.api import (
     Diagnostic,
     Ground,
     InputError,
+    LayoutTable,
     Position,
     Project,
     Settings,
@@ -25,7 +26,7 @@ from factory.api import (
 )
 from factory.apps.log.cell_table import cell_in
 from factory.apps.log.project_table import ProjectTable, project_of, project_table
-from factory.floor.layout.saved import LAID_FOR, LayoutTable
+from factory.floor.layout.saved import LAID_FOR
 from factory.support.files import MESH, read_bytes
 from factory.support.tables import MISFITS, misfit, table_of, value_of
 

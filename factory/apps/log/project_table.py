@@ -22,6 +22,7 @@ from factory.api import (
     Factory,
     Ground,
     InputError,
+    LayoutTable,
     Plan,
     Project,
     Settings,
@@ -32,7 +33,6 @@ from factory.api import (
 )
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
-from factory.floor.layout.saved import LayoutTable
 from factory.support.tables import MISFITS, misfit, table_of, value_of
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag

@@ -20,6 +20,7 @@ from factory.api import (
     Event,
     FactoryError,
     InputError,
+    LayoutTable,
     MonitorSubject,
     Observation,
     Project,
@@ -36,7 +37,6 @@ from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
 from factory.engine.record.verdict import kept_figures
-from factory.floor.layout.saved import LayoutTable
 from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.files import unwritten

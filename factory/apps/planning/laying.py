@@ -23,6 +23,7 @@ from factory.api import (
     listing,
     load_catalogue,
     pace,
+    product_geometry,
 )
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.planning.bases import EQUAL
@@ -34,7 +35,6 @@ from factory.apps.planning.searching import Aim
 from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
-from factory.floor.geometry.product import product_geometry
 from factory.theory.lang.pag_reader import read_pag
 
 LAID = 120

@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from factory.api import PAG, Allowance, Template
+from factory.api import PAG, Allowance, Template, product_geometry
 from factory.apps.planning.bases import EQUAL, likely, worth
 from factory.apps.planning.blocking import NO_RELATION, Blocking, Unheld
 from factory.apps.planning.divisions import KnownDivisions
@@ -26,7 +26,6 @@ from factory.apps.planning.subsets import BLOCKED, MOST, ROOT_AXIS, Stance
 from factory.apps.planning.threads import threads
 from factory.apps.planning.turning import only
 from factory.apps.planning.writing import leaves, planned_product
-from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
 from factory.theory.compiler.expanding import expand

@@ -19,6 +19,7 @@ from factory.api import (
     Template,
     did_you_mean,
     load_pag,
+    product_geometry,
     rotation,
 )
 from factory.apps.importing import Imported, Options, import_product
@@ -36,7 +37,6 @@ from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
 from factory.floor.geometry.overlap import drawn
-from factory.floor.geometry.product import product_geometry
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.texts import quoted

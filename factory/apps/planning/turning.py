@@ -13,10 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from factory.api import product_geometry
 from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.apps.planning.source import surface
 from factory.apps.planning.writing import planned_product
-from factory.floor.geometry.product import product_geometry
 from factory.support.arrays import Array
 from factory.support.triangles import normals_of
 

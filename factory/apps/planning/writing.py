@@ -11,13 +11,12 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Template, write_pag
+from factory.api import PAG, Assembly, Template, product_geometry, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.titles import Titles
 from factory.floor.geometry.overlapping import overlaps_of
-from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
 from factory.theory.compiler.expanding import expand

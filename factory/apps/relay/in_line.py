@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout
+from factory.api import Factory, Hand, Layout, carriers
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.kinds import BELOW
@@ -20,7 +20,6 @@ from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import Places, centre_of
 from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.hands.tips import STRONG
-from factory.floor.layout.layout import carriers
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 InLine = tuple[tuple[Hand | None, ...], set[int]]

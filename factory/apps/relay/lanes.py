@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout, Operation
-from factory.floor.layout.dimensions import FINGER, Clearance
+from factory.api import Clearance, Factory, Hand, Layout, Operation
+from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from factory.api import (
     NOPART,
+    Clearance,
     Ground,
     Hands,
     Layout,
@@ -27,7 +28,6 @@ from factory.api import (
 )
 from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
-from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
 from factory.support.collector import collector_paused

@@ -14,20 +14,22 @@ from math import ceil
 
 from factory.api import (
     Certificate,
+    Clearance,
     Factory,
     Hands,
     Layout,
     Pace,
     Product,
+    carriers,
     certify,
     payload_boxes,
 )
 from factory.apps.revise.pins import Pins
+from factory.floor.layout.branches import branch_of
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.crowding import crowding_faults
-from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
+from factory.floor.layout.dimensions import TOOL_TRAVEL, up
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.layout import branch_of, carriers
 from factory.floor.layout.optimising import arrange, shape_of
 from factory.floor.layout.packing import Task
 from factory.floor.layout.shapes import Shape, headings

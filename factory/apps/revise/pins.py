@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from factory.api import Hand, Layout, Point2, Product
+from factory.api import Hand, Layout, Point2, Product, carriers
 from factory.apps.revise.pairing import Pairing
-from factory.floor.layout.layout import carriers
 from factory.floor.layout.stops import carried
 from factory.support.arrays import Array
 

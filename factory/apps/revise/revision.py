@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 
 from factory.api import (
     NOPART,
+    Clearance,
     Factory,
     Ground,
     Hands,
@@ -32,7 +33,6 @@ from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
 from factory.apps.revise.revision_picture import draw_revision
-from factory.floor.layout.dimensions import Clearance
 from factory.floor.mating.mating import judged
 
 Pin = Literal["all", "hands", "none"]

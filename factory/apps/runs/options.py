@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, usage_error
-from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
+from factory.api import Diagnostic, InputError, WorldName, usage_error
+from factory.support.bounds import WORLDS, check_choice, check_values
 
 if TYPE_CHECKING:
     from factory.api import Factory, Layout, Marking, Product, Project, RunRequest

@@ -11,7 +11,16 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any, TypeVar
 
-from factory.api import Diagnostic, FactoryError, Layout, Run, RunRequest, Settings, Simulation
+from factory.api import (
+    Diagnostic,
+    FactoryError,
+    Layout,
+    Run,
+    RunRequest,
+    Settings,
+    Simulation,
+    proved,
+)
 from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import recover
 from factory.apps.runs.options import fusing_pays
@@ -21,7 +30,6 @@ from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed
 from factory.engine.simulation.compiled import Compiled, compiled
 from factory.floor.layout.saved import LAID_FOR
-from factory.theory.nets.verify import proved
 
 T = TypeVar("T")
 

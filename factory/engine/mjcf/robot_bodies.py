@@ -21,9 +21,10 @@ from factory.engine.mjcf.robots import (
 )
 from factory.engine.mjcf.scene import add_follower
 from factory.engine.mjcf.stops import stops_of
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Guidepath, Layout
+from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
 from factory.support.xml_writer import add, numbers
 from factory.theory.plant.factory import Factory

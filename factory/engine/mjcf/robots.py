@@ -16,8 +16,8 @@ from factory.engine.mjcf.names import carriage, drive_across, head, slide_across
 from factory.engine.mjcf.stops import Stops
 from factory.engine.mjcf.tools import TOOL, mount_tool
 from factory.floor.layout.dimensions import PAYLOAD
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.limbs import Limb
-from factory.floor.layout.layout import Guidepath
 from factory.support.xml_writer import add, number, numbers
 from factory.theory.plant.axes import Axis
 from factory.theory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody

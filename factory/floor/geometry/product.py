@@ -80,12 +80,19 @@ def product_geometry(
     report: Callable[[int, int], None] = lambda *_: None,
     entered: frozenset[str] | None = None,
 ) -> Product:
-    """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
-    of the PAG. Where it is not `decomposed`, meshes that are not convex have their hulls for
-    bodies. `report` is called with the number of meshes that are read, and of how many. `entered`:
-    the parts in which others stand, where that is known of another attitude. Raises InputError if a
-    mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy for the engine
-    (BadValue)."""
+    """The solids of all parts.
+
+    Args:
+        pag: the product.
+        files: contents of meshes by path, which are looked up before the folder of the PAG.
+        decomposed: whether meshes that are not convex are taken apart; else they have their hulls
+            for bodies.
+        report: called with the number of meshes that are read, and of how many.
+        entered: the parts in which others stand, where that is known of another attitude.
+
+    Raises InputError if a mesh cannot be read (BadMesh), or a part is too large, too far away or
+    too heavy for the engine (BadValue).
+    """
     reader = _Reader(Path(pag.folder), files, decomposed, report)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]

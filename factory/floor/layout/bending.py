@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.guidepath import Guidepath, Point2
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import Bend
 
 

@@ -8,7 +8,7 @@ there is no room there is no bin.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -22,7 +22,7 @@ from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
 from factory.floor.layout.guidepath import Box, Point2, hull, moved
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.scrapping import not_carried_back
-from factory.floor.layout.sweeps import Pile, piles, regions
+from factory.floor.layout.sweeps import Pile, piles_of, regions
 from factory.theory.problem.pag import NOPART
 
 PLATE = 0.002
@@ -66,8 +66,8 @@ class Bin:
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, at most one for each robot: wide enough for everything that
     it can carry back to B, else for the smallest."""
-    by_label = piles(layout.factory, layout.product)
-    taken, added = regions(layout, by_label), list[Region]()
+    by_label = piles_of(layout)
+    taken, added = regions(layout), list[Region]()
     corners = np.array([region.box for region in taken])
     tree = STRtree(shapely.box(*corners[:, [0, 2, 1, 3]].T))
     barred, made = not_carried_back(layout), list[Bin]()
@@ -91,7 +91,7 @@ Held = list[tuple[str, Pile]]
 
 
 def _held(
-    layout: Layout, robot: int, by_label: dict[str, Pile], barred: frozenset[tuple[int, str]]
+    layout: Layout, robot: int, by_label: Mapping[str, Pile], barred: frozenset[tuple[int, str]]
 ) -> Held:
     path, result = layout.guidepaths[robot], dict[str, Pile]()
     for number in layout.factory.robots[robot].operations:

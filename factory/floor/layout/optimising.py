@@ -17,6 +17,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.certificate import Region
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.drafting import LayoutDraft
@@ -24,7 +25,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.layout.guidepath import Box, Point2, hull
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import bare
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.outline import Outline
 from factory.floor.layout.packing import WIDTHS, Packing, Task
 from factory.floor.layout.shapes import (
@@ -41,7 +42,7 @@ from factory.floor.layout.shapes import (
 )
 from factory.floor.layout.sides import admissible, admitted
 from factory.floor.layout.stretching import Stretched, outgoing, stretch
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 
@@ -110,7 +111,7 @@ def optimised(
 
 def floor_of(layout: Layout) -> Box:
     """The floor that a layout takes."""
-    swept = regions(layout, piles(layout.factory, layout.product))
+    swept = regions(layout)
     return bounds(swept, layout.clearance)
 
 

@@ -96,9 +96,23 @@ def _pile(product: Product, low: Array, high: Array) -> Pile:
     return Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))
 
 
-def regions(layout: Layout, by_label: Mapping[str, Pile]) -> list[Region]:
-    """Every region of a layout, robot by robot. Linear in the sum of the gears' lengths."""
-    result: list[Region] = []
+def piles_of(layout: Layout) -> Mapping[str, Pile]:
+    """The piles of a layout. Computed once."""
+    return layout.kept(_piles)
+
+
+def _piles(layout: Layout) -> Mapping[str, Pile]:
+    return piles(layout.factory, layout.product)
+
+
+def regions(layout: Layout) -> list[Region]:
+    """What robots, payloads and stations sweep, robot by robot. Linear in the sum of the gears'
+    lengths.
+
+    Args:
+        layout: the layout.
+    """
+    result, by_label = list[Region](), piles_of(layout)
     for robot in range(len(layout.factory.robots)):
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, by_label))

@@ -10,7 +10,7 @@ import shapely
 from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
 from factory.support.arrays import Array
 
 SHIFTS = 12
@@ -40,7 +40,7 @@ def _boxes(layout: Layout) -> Array:
     """The regions of a layout (n, 4) [m]."""
     occupied = layout.certificate.regions if layout.certificate else None
     if occupied is None:
-        occupied = tuple(regions(layout, piles(layout.factory, layout.product)))
+        occupied = tuple(regions(layout))
     return np.array([region.box for region in occupied])
 
 

@@ -25,8 +25,13 @@ from factory.theory.nets.verdict import Defect, Verdict, listing, verdict
 
 
 def proved(net: GearNet) -> Verdict:
-    """The verdict on a net all of whose properties hold. Raises RunError (NotProved) with a witness
-    for each that does not."""
+    """The verdict on a net all of whose properties hold.
+
+    Args:
+        net: a gear net.
+
+    Raises RunError (NotProved) with a witness for each that does not.
+    """
     proof = verify(net)
     if not proof.holds:
         raise RunError(

@@ -85,11 +85,10 @@ def analyze(
     out: OutputOptions,
 ) -> int:
     """Find the bottleneck of FILE.pag, and what would relieve it."""
-    from factory.api import Timing
+    from factory.api import Timing, proved
     from factory.apps.analyze import analyse
     from factory.apps.analyze.document import document
     from factory.apps.analyze.measured import Conditions, conditions, logged_record
-    from factory.theory.nets.verify import proved
 
     log = study.log(out.silent)
     made = (

@@ -129,9 +129,8 @@ def _chosen(columns: Sequence[str]) -> dict[str, str]:
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """The warnings that `build` will give about the shapes of a written PAG."""
-    from factory.api import load_pag
+    from factory.api import load_pag, product_geometry
     from factory.floor.geometry.overlapping import overlaps_of
-    from factory.floor.geometry.product import product_geometry
 
     try:
         made = load_pag(pag, templates)

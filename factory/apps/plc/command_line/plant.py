@@ -56,10 +56,9 @@ def plant(
     It ends when its products are made. The controller writes targets, grips, jobs and a heartbeat,
     without which all axes stand. What the net or the reach of a grip does not allow is refused by
     name. `export --format st` writes a controller."""
-    from factory.api import Simulation
+    from factory.api import Simulation, proved
     from factory.apps.plc.opcua import OpcuaPlant, check_plant
     from factory.apps.runs.running import carry_on
-    from factory.theory.nets.verify import proved
 
     check_plant(host, expose)
     if asked.start is not None:

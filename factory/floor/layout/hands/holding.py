@@ -10,11 +10,11 @@ import numpy as np
 
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import axis_of, fed_of
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
-from factory.floor.layout.layout import carriers
 from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
