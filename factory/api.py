@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from factory.engine.mjcf import names as names
+    from factory.engine.mjcf.loading import load as load
     from factory.engine.mjcf.model import Model as Model
     from factory.engine.mjcf.parts import HIDDEN as HIDDEN
     from factory.engine.mjcf.replica import Geoms as Geoms
@@ -70,19 +71,18 @@ if TYPE_CHECKING:
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
-    from factory.support.errors import Position as Position
     from factory.support.errors import RunError as RunError
-    from factory.support.errors import did_you_mean as did_you_mean
-    from factory.support.errors import usage_error as usage_error
     from factory.support.settings import Settings as Settings
     from factory.theory.control.laws import Setting as Setting
     from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
     from factory.theory.control.mode import Mode as Mode
     from factory.theory.lang.pag_reader import load_pag as load_pag
+    from factory.theory.lang.pag_reader import read_pag as read_pag
     from factory.theory.lang.source import read_text as read_text
     from factory.theory.lang.template_reader import all_templates as all_templates
     from factory.theory.lang.writer import write_pag as write_pag
+    from factory.theory.nets.gears import Gear as Gear
     from factory.theory.nets.gears import GearNet as GearNet
     from factory.theory.nets.marked import NONE as NONE
     from factory.theory.nets.marked import MarkedNet as MarkedNet
@@ -112,8 +112,7 @@ if TYPE_CHECKING:
     from factory.theory.problem.template import Template as Template
 
 HOMES = {
-    "support.errors": "Diagnostic FactoryError InputError Position RunError "
-    "did_you_mean usage_error",
+    "support.errors": "Diagnostic FactoryError InputError RunError",
     "support.settings": "Settings",
     "support.bounds": "Allowance WorldName",
     "support.apps": "App",
@@ -122,11 +121,11 @@ HOMES = {
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
-    "theory.lang.pag_reader": "load_pag",
+    "theory.lang.pag_reader": "load_pag read_pag",
     "theory.lang.source": "read_text",
     "theory.lang.writer": "write_pag",
     "theory.lang.template_reader": "all_templates",
-    "theory.nets.gears": "GearNet",
+    "theory.nets.gears": "Gear GearNet",
     "theory.nets.marked": "MarkedNet NONE marked token_free",
     "theory.nets.petri": "Marking PetriNet Place Transition",
     "theory.nets.undone": "Entry Undone",
@@ -163,6 +162,7 @@ HOMES = {
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",
     "engine.mjcf.replica": "Geoms Replica",
+    "engine.mjcf.loading": "load",
     "engine.timing.timed": "pace",
     "engine.timing.timing": "Timing",
     "engine.record.ending": "CutOff",

@@ -17,6 +17,7 @@ __all__ = [
     "corner_normals",
     "is_closed",
     "joined",
+    "moved_by",
     "normals_of",
     "stl",
     "submeshes",
@@ -84,6 +85,12 @@ def joined(bodies: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
+
+
+def moved_by(matrix: Array, vertices: Array, faces: Indices) -> tuple[Array, Indices]:
+    """Triangles after an affine map (4, 4), still oriented outwards if it mirrors them."""
+    flips = bool(np.linalg.det(matrix[:3, :3]) < 0)
+    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces[:, ::-1] if flips else faces
 
 
 def stl(vertices: Array, faces: Indices) -> bytes:

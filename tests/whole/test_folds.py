@@ -22,6 +22,7 @@ from factory.apps.few_robots.folding import (
     line_of,
     lines_of_labels,
 )
+from factory.apps.runs.start import legal_marking
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.bounds import _Bound
@@ -29,12 +30,12 @@ from factory.floor.layout.durations import Pace
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.history import firings, legal_marking
+from factory.theory.nets.history import firings
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import proved, verify
 from factory.theory.plant.factory import Factory
-from factory.theory.plant.programs import program_of
+from factory.theory.plant.programs import Program
 from tests.fold_values import (
     fold_layout,
     inserted,
@@ -375,7 +376,7 @@ def test_two_inputs_of_one_operation_share_no_robot() -> None:
 
 def test_programs_of_a_robot_with_two_tours() -> None:
     factory = three_robots()
-    text = write_program(program_of(factory, 1))
+    text = write_program(Program.of(factory, 1))
     assert text == "\n".join(
         [
             "// r2",
@@ -401,7 +402,7 @@ def test_programs_of_a_robot_with_two_tours() -> None:
             "End Loop",
         ]
     )
-    assert "next" not in write_program(program_of(factory, 0))
+    assert "next" not in write_program(Program.of(factory, 0))
 
 
 def test_folds_are_laid_out() -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from factory.api import Diagnostic, Factory, InputError, Timing, did_you_mean, usage_error
+from factory.api import Diagnostic, Factory, InputError, Timing
 from factory.apps.analyze.firing import slacks
 from factory.apps.analyze.measured import Comparison, RunRecord, compare
 from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
@@ -14,6 +14,7 @@ from factory.apps.drawing.tables import Tabular, titled
 from factory.engine.timing.pool import part_pool
 from factory.engine.timing.timed import SAME
 from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.support.errors import did_you_mean, usage_error
 
 MOST: Mapping[str, float] = {"faster": 1e6, "shorter": 100.0}
 """The most that a robot is faster, and its ways are shorter [percent]."""

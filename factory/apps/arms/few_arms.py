@@ -6,10 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 
-from factory.api import Diagnostic, InputError, Project, RunError, pace, usage_error
+from factory.api import Diagnostic, InputError, Project, RunError, pace
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import RAILS, asked_arms
 from factory.apps.arms.ground import CellProject, cell_of
+from factory.support.errors import usage_error
 
 WITHIN = 5e-3
 """A cycle time is met within this [s]: the half of a hundredth, as it is printed."""

@@ -8,21 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from factory.api import (
-    Factory,
-    Ground,
-    InputError,
-    Layout,
-    Position,
-    Product,
-    Project,
-    Settings,
-)
+from factory.api import Factory, Ground, InputError, Layout, Product, Project, Settings
 from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import arms_in, asked_arms
 from factory.apps.arms.joint_way import WayLimits
 from factory.apps.arms.model import KINDS, ArmModel
+from factory.support.errors import Position
 
 
 @dataclass(frozen=True, slots=True)

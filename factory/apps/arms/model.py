@@ -16,10 +16,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, Position, usage_error
+from factory.api import Diagnostic, InputError
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.read import MODELS, chain_of, read_chain
 from factory.support.engine import mujoco
+from factory.support.errors import Position, usage_error
 
 KINDS = tuple(sorted(file.stem for file in MODELS.glob("*.xml")))
 """The arms that are shipped."""

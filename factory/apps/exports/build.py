@@ -32,7 +32,7 @@ from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
 from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names, write_all
-from factory.theory.plant.programs import program_of
+from factory.theory.plant.programs import Program
 
 
 def _json(document: object) -> str:
@@ -51,7 +51,7 @@ class _Drawn:
 
 def _programs(what: _Drawn) -> str:
     factory = what.project.layout.factory
-    programs = (write_program(program_of(factory, robot.index)) for robot in factory.robots)
+    programs = (write_program(Program.of(factory, robot.index)) for robot in factory.robots)
     return "\n\n".join(programs) + "\n"
 
 
@@ -173,7 +173,7 @@ def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
     since the engine has accepted this model then. Raises InputError where it does not."""
     if path and kept(path, key_of(model)) is not None:
         return {}
-    from factory.engine.mjcf.loading import load
+    from factory.api import load
 
     m = load(model)
     return sealed(path, key_of(model), packed(m)) if path else {}

@@ -35,9 +35,8 @@ def export(subject: Subject) -> bytes:
 
 def _state(subject: Subject) -> Replica:
     """The engine's model in the requested state."""
-    from factory.api import Replica
+    from factory.api import Replica, load
     from factory.apps.log.model import model_of
-    from factory.engine.mjcf.loading import load
 
     if isinstance(subject.source, Log):
         replica = Replica(model_of(subject.log))

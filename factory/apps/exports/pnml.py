@@ -11,11 +11,11 @@ import re
 from collections.abc import Iterable, Iterator
 
 from factory.api import (
+    Gear,
     GearNet,
     MarkedNet,
     Place,
     Point2,
-    Position,
     Project,
     Transition,
     coordinated,
@@ -24,7 +24,7 @@ from factory.api import (
 from factory.apps.drawing.markup import escape, quoteattr
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
-from factory.theory.nets.gears import Gear
+from factory.support.errors import Position
 from factory.theory.nets.threaded import Redistribution
 
 FORMAT, TAKES = "pnml", "net"

@@ -35,7 +35,7 @@ GRAM = 1e-3
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
     """The URDF; with its meshes, where there are any."""
-    from factory.engine.mjcf.loading import load
+    from factory.api import load
 
     project = subject.project
     model = written(physical_model(project.layout, 1, project.settings, project.catalogue))

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import usage_error
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
+from factory.support.errors import usage_error
 from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "usd", "log", True

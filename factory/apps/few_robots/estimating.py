@@ -28,7 +28,6 @@ from factory.apps.few_robots.parallel import Branches
 from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.layout.hands.misses import NoGrip
 from factory.theory.compiler.expanding import expand
-from factory.theory.problem.plan import THIRD
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""
@@ -261,7 +260,7 @@ def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, in
     for no_grip in project.no_grips:
         robot = robots[no_grip.robot]
         operations = [factory.operations[number] for number in robot.operations]
-        piles = [o for o in operations if forms.get(o.label, THIRD) != THIRD]
+        piles = [o for o in operations if forms.get(o.label, Plan.THIRD) != Plan.THIRD]
         carried = [o for o in piles if o.carrier == robot.index] or piles
         if carried:
             label = max(carried, key=lambda o: _in_the_way(no_grip, o, factory)).label

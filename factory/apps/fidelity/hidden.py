@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Layout, Simulation, names, physical_model
+from factory.api import Layout, Simulation, load, names, physical_model
 from factory.apps.fidelity.record import Penetration
 from factory.apps.fidelity.solid import SolidReplica
-from factory.engine.mjcf.loading import load
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 from factory.theory.plant.approaches import Pair

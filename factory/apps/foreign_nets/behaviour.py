@@ -14,10 +14,11 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, GearNet, MarkedNet, Position, Verdict, listing, marked, token_free
+from factory.api import NONE, GearNet, MarkedNet, Verdict, listing, marked, token_free
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.support.collector import collector_paused
+from factory.support.errors import Position
 from factory.theory.nets.composition import compose
 from factory.theory.nets.marked import stuck_circuit
 from factory.theory.nets.train import no_way_back

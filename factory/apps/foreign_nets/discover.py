@@ -12,9 +12,8 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, MarkedNet, PlaceId, TransitionId, listing
+from factory.api import NONE, Gear, MarkedNet, PlaceId, TransitionId, listing
 from factory.theory.nets.composition import MOST, no_gear_net, notation
-from factory.theory.nets.gears import Gear
 from factory.theory.nets.marked import MANY
 from factory.theory.nets.verdict import Defect
 

@@ -14,22 +14,21 @@ from typing import TypeVar
 
 from factory.api import (
     NONE,
+    Gear,
     GearNet,
     MarkedNet,
     PetriNet,
     Place,
     PlaceId,
-    Position,
     Transition,
     TransitionId,
-    did_you_mean,
     read_text,
 )
 from factory.support.collector import collector_paused
+from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
 from factory.theory.nets.composition import compose
-from factory.theory.nets.gears import Gear
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
 
 N = TypeVar("N", bound=int)

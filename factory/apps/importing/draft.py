@@ -10,8 +10,9 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Position, Product
+from factory.api import PAG, Assembly, Diagnostic, InputError, Product
 from factory.floor.geometry.overlapping import overlaps_of
+from factory.support.errors import Position
 from factory.support.texts import where
 from factory.theory.lang.words import is_label
 from factory.theory.problem.pag import RESERVED, AllowedOverlap, Parameter

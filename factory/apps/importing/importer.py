@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from factory.api import PAG, Diagnostic, InputError, Template, did_you_mean, read_text, write_pag
+from factory.api import PAG, Diagnostic, InputError, Template, read_text, write_pag
 from factory.apps.importing.bill import BillReader
 from factory.apps.importing.document import read_json, read_yaml
 from factory.apps.importing.draft import DraftNode, ImportFaults, Mates, assemble, file_stem
@@ -16,6 +16,7 @@ from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import PartMaker
 from factory.apps.importing.tree_file import TreeReader
 from factory.support.collector import collector_paused
+from factory.support.errors import did_you_mean
 from factory.support.texts import quoted, source_of
 from factory.theory.lang.operations import signature
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.api import did_you_mean
 from factory.apps.importing.document import DocumentNode as Node
 from factory.apps.importing.draft import (
     MATE,
@@ -18,6 +17,7 @@ from factory.apps.importing.draft import (
     too_many,
 )
 from factory.apps.importing.part_maker import PartMaker, Placement
+from factory.support.errors import did_you_mean
 from factory.support.texts import quoted
 from factory.theory.lang.operations import MESHES, Signature
 from factory.theory.lang.values import GEOMETRY, Kind

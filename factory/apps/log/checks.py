@@ -15,7 +15,6 @@ from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
 from factory.engine.record.verdict import check_kept_figures
-from factory.support.settings import AUTO
 from factory.support.tables import LARGE, value_of
 
 HEADER = "header"
@@ -71,8 +70,8 @@ class LogHeader(ProjectTable):
             raise ValueError("wip must be a whole number from 1, or null, not 0")
         if not 0 <= self.jitter < 1:
             raise ValueError(f"jitter must be a number from 0 to less than 1, not {self.jitter}")
-        if self.settings.timestep == AUTO:
-            raise ValueError(f"settings.timestep must be a number, not {AUTO}")
+        if self.settings.timestep == "auto":
+            raise ValueError("settings.timestep must be a number, not auto")
         if not self.monitor.patience > 0:
             raise ValueError(f"monitor.patience must be above 0, not {self.monitor.patience}")
         if not all(0 <= place < len(self.places) for place in self.start):

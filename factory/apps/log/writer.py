@@ -40,7 +40,6 @@ from factory.engine.record.verdict import kept_figures
 from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.files import unwritten
-from factory.support.settings import AUTO
 from factory.support.tables import table_of
 from factory.support.version import release
 
@@ -302,7 +301,7 @@ def _header(
         "units": simulation.request.units,
         "wip": simulation.request.wip,
         "chosen": {
-            "timestep": simulation.asked.settings.timestep == AUTO,
+            "timestep": simulation.asked.settings.timestep == "auto",
             "wip": simulation.asked.wip is None,
         },
         "distributed": simulation.request.distributed,

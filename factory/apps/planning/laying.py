@@ -24,6 +24,7 @@ from factory.api import (
     load_catalogue,
     pace,
     product_geometry,
+    read_pag,
 )
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.planning.bases import EQUAL
@@ -35,7 +36,6 @@ from factory.apps.planning.searching import Aim
 from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
-from factory.theory.lang.pag_reader import read_pag
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

@@ -19,7 +19,6 @@ from factory.api import (
     Settings,
     Template,
     all_templates,
-    did_you_mean,
 )
 from factory.apps.planning.blocking import (
     CLASHES,
@@ -56,6 +55,7 @@ from factory.apps.planning.subsets import MOST, stances
 from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array
+from factory.support.errors import did_you_mean
 
 DECOMPOSING = "decomposing parts into convex bodies"
 """The name of the stage after a tree is found: layouts and runs need these bodies, ways do not."""

@@ -17,7 +17,6 @@ from factory.api import (
     Product,
     Solid,
     Template,
-    did_you_mean,
     load_pag,
     product_geometry,
     rotation,
@@ -33,12 +32,13 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.mesh_file import ANEW
 from factory.floor.geometry.overlap import drawn
+from factory.support.alike import shape_of
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
+from factory.support.errors import did_you_mean
 from factory.support.texts import quoted
 from factory.support.triangles import convex_hull
 from factory.theory.problem.pag import SHAPES

@@ -20,7 +20,7 @@ from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
 from factory.theory.compiler.expanding import expand
-from factory.theory.problem.pag import AllowedOverlap, most_allowed
+from factory.theory.problem.pag import AllowedOverlap
 
 Unit = TypeVar("Unit", bound=str | int)
 
@@ -143,7 +143,7 @@ def _meant(
     deep: dict[tuple[str, str], float] = {}
     for pair in overlaps_of(product).pairs:
         is_thread = (pair.one in threaded) != (pair.other in threaded)
-        needed = pair.depth > most_allowed(pag.allowed, pair.one, pair.other)
+        needed = pair.depth > pag.most_allowed(pair.one, pair.other)
         if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):
             deep[pair.one, pair.other] = pair.depth
     judged = matings(expand(pag, templates), product).all if allow else ()

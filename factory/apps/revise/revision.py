@@ -25,7 +25,6 @@ from factory.api import (
     RunError,
     certified,
     pace,
-    usage_error,
 )
 from factory.apps.revise.inheriting import Inheritance
 from factory.apps.revise.matching import matching, shifted
@@ -34,6 +33,7 @@ from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
 from factory.apps.revise.revision_picture import draw_revision
 from factory.floor.mating.mating import judged
+from factory.support.errors import usage_error
 
 Pin = Literal["all", "hands", "none"]
 """What is pinned of the old layout, the most first."""

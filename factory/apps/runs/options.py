@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, WorldName, usage_error
+from factory.api import Diagnostic, InputError, WorldName
 from factory.support.bounds import WORLDS, check_choice, check_values
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.api import Factory, Layout, Marking, Product, Project, RunRequest
@@ -133,7 +134,7 @@ class RunOptions:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.api import RunRequest
         from factory.apps.runs.demand_file import demand_of
-        from factory.theory.nets.history import legal_marking
+        from factory.apps.runs.start import legal_marking
 
         self.check_combination()
         layout, start, units, demand = project.layout, self.start, self.units, None

@@ -11,8 +11,9 @@ from dataclasses import dataclass, fields
 from itertools import product
 from math import ceil, isfinite, prod
 
-from factory.api import Diagnostic, InputError, Settings, did_you_mean
+from factory.api import Diagnostic, InputError, Settings
 from factory.support.bounds import BOUNDS
+from factory.support.errors import did_you_mean
 from factory.support.settings import RANGES, is_auto
 from factory.support.settings import WHOLE as WHOLE_SETTINGS
 

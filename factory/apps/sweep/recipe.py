@@ -20,11 +20,11 @@ from factory.api import (
     Project,
     load_catalogue,
     proved,
-    usage_error,
     write_pag,
 )
 from factory.apps.runs.options import check_ideal
 from factory.apps.sweep.grid import DEFAULTS, SETTINGS, GridAxis, Point, Value
+from factory.support.errors import usage_error
 from factory.support.resources import mjcf_folder
 from factory.support.tables import table_of
 from factory.support.version import __version__

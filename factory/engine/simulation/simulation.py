@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from factory.engine.mjcf.timestep import timed
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observer, State
-from factory.engine.simulation.compiled import Compiled, compiled
+from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.distributed import DistributedSupervisor
 from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.modelling import modelled
@@ -118,7 +118,7 @@ class Simulation:
 
     def again(self, seed: int) -> Simulation:
         """Another run of the same with another seed; what both share is compiled once."""
-        self._shared = self._shared or compiled(self.layout, self.asked)
+        self._shared = self._shared or Compiled.of(self.layout, self.asked)
         return Simulation(self.layout, replace(self.asked, seed=seed), self._shared)
 
     @cached_property

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.alike import PartShape, motion_between, moved, shape_of
 from factory.floor.geometry.decimation import ENOUGH, decimated
 from factory.floor.geometry.meshes import Mesh, is_flat
 from factory.floor.geometry.overlap import bounded, merged
 from factory.floor.geometry.pieces import FLATNESS, closed_bodies, is_convex
 from factory.floor.geometry.prisms import prisms
+from factory.support.alike import PartShape, motion_between, moved, shape_of
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment

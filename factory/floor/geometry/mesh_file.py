@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.merging import merged_vertices
 from factory.support.arrays import Array, Indices
+from factory.support.merging import merged_vertices
 from factory.support.triangles import areas_of, joined
 
 EXPECTED = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,9 +18,6 @@ from factory.floor.layout.visits import Visit
 from factory.support.errors import RunError
 from factory.theory.plant.factory import Factory
 
-LAID_FOR = ("clearance", "acceleration")
-"""The settings that a layout depends on: what is for others is laid out anew."""
-
 AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 """The ways that guidepaths head."""
 
@@ -29,6 +27,7 @@ class LayoutTable:
     """A layout as it is kept in a file, by the names that `Layout` has.
 
     Attributes:
+        LAID_FOR: the settings that a layout depends on: what is for others is laid out anew.
         clearance: least distance between machines [m].
         guidepaths: of each robot.
         visits: for each operation those of its robots.
@@ -39,6 +38,8 @@ class LayoutTable:
             product's own.
         tile: size of the tiles of a platen [m]; 0 without one.
     """
+
+    LAID_FOR: ClassVar[tuple[str, ...]] = ("clearance", "acceleration")
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]

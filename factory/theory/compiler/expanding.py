@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from factory.support.errors import Position
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART, PAG, Assembly
-from factory.theory.problem.plan import AS_WRITTEN, THIRD, Plan
+from factory.theory.problem.plan import AS_WRITTEN, Plan
 from factory.theory.problem.template import Template
 
 RELAY = "relay"
@@ -143,10 +143,10 @@ def _operations(
     for number in range(taken, count + 1):
         label = assembly.label if number == count else f"{assembly.label}/{number}"
         inputs = assembly.inputs[:taken] if number == taken else (pile, assembly.inputs[number - 1])
-        form = THIRD if number == taken else 0
+        form = Plan.THIRD if number == taken else 0
         if template.instead and count > 1:
             form = forms.get(label, form)
-        if form == THIRD:
+        if form == Plan.THIRD:
             of = chosen = template
         elif number > taken and form == 0 and of.further:
             chosen = templates[of.further]

@@ -206,6 +206,10 @@ class PAG(Pictured):
         each = (self.product(label).parts() for label in self.products)
         return tuple(frozenset(part.label for part in parts) for parts in each)
 
+    def most_allowed(self, one: str, other: str) -> float:
+        """The depth that two parts may overlap by [m], 0 where nothing is allowed of them."""
+        return most_allowed(self.allowed, one, other)
+
     def check_alone(self, option: str) -> None:
         """Raises InputError (BadMix) for a mix: an option is for one product."""
         if self.mix is not None:

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from factory.api import Diagnostic, InputError, usage_error
+from factory.api import Diagnostic, InputError
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
+from factory.support.errors import usage_error
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:

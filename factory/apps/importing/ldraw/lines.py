@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from factory.api import Position
 from factory.apps.importing.draft import ImportFaults
 from factory.support.decimals import number
+from factory.support.errors import Position
 from factory.support.texts import Source, quoted
 
 FURTHEST = 1e7

@@ -6,7 +6,6 @@ import sys
 
 import click
 
-from factory.api import usage_error
 from factory.apps.runs.options import RunOptions
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
@@ -15,6 +14,7 @@ from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.summaries import summarise, tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
+from factory.support.errors import usage_error
 
 SCAN = 10
 """Default period at which the plant reads its commands [ms]."""
