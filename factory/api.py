@@ -43,7 +43,6 @@ if TYPE_CHECKING:
     from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
-    from factory.floor.geometry.solids import rotation as rotation
     from factory.floor.layout.branches import carriers as carriers
     from factory.floor.layout.certificate import Certificate as Certificate
     from factory.floor.layout.clearance import certify as certify
@@ -138,7 +137,7 @@ HOMES = {
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
     "floor.geometry.meshes": "Mesh",
-    "floor.geometry.solids": "Product Solid rotation",
+    "floor.geometry.solids": "Product Solid",
     "floor.geometry.product": "product_geometry",
     "floor.robots.catalogue": "load_catalogue",
     "floor.mating.finder": "Finder",

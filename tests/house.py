@@ -21,7 +21,7 @@ from tests.paths import ROOT
 MOST = 100
 """How many names the interface may have."""
 
-MOST_TOOLS = 96
+MOST_TOOLS = 128
 """How many tools `support` may have."""
 
 ENTRY = re.compile(r"^ +(\w+(?:, \w+)*):", re.M)

@@ -5,8 +5,8 @@ beside `factory.api`. They import no module but such ones.
 
 * Errors and output: `errors.py` (`Diagnostic`) with the texts of `explanations/`, `console.py`,
   `progress.py`, `interruption.py`.
-* Texts and numbers: `texts.py`, `decimals.py`, `xml_writer.py`; triangle meshes: `triangles.py`,
-  `mesh_bodies.py`.
+* Texts and numbers: `texts.py`, `decimals.py`, `xml_writer.py`; triangle meshes:
+  `meshes/`, from `triangles.py` to `mesh_reader.py`; `rotations.py`.
 * Files: `files.py`, `guard.py`, `claim.py`, `cache.py`, `resources.py`; their contents:
   `tables.py`, `toml_files.py`, `xml_tree.py`.
 * Pictures and films: `pictures/`, from `ink.py` to `video.py`.

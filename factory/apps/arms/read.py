@@ -14,11 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, rotation
+from factory.api import Diagnostic, InputError
 from factory.apps.arms.chain import ConvexBody, JointLimits, LinkInertia, SerialChain, steiner
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Position
+from factory.support.rotations import rotation
 
 MODELS = Path(__file__).parent / "mjcf"
 """Where the arms of the catalogue are."""

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from factory.api import PAG, Mesh, Product, rotation
+from factory.api import PAG, Mesh, Product
 from factory.apps.exports.subject import Subject, triangles, wanted
-from factory.floor.geometry.glb_reader import UPRIGHT
 from factory.support.arrays import Array, Indices
-from factory.support.triangles import corner_normals
+from factory.support.meshes.glb_reader import UPRIGHT
+from factory.support.meshes.triangles import corner_normals
+from factory.support.rotations import rotation
 
 WORLD = "/world"
 """The outermost node."""

@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN, Diagnostic, InputError, Mesh, names, physical_model, rotation
+from factory.api import HIDDEN, Diagnostic, InputError, Mesh, names, physical_model
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
 from factory.support.arrays import Array
+from factory.support.rotations import rotation
 
 if TYPE_CHECKING:
     from factory.api import Replica

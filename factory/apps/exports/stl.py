@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.api import rotation
 from factory.apps.exports.subject import Subject, triangles, wanted
-from factory.support.triangles import joined, stl
+from factory.support.meshes.triangles import joined, stl
+from factory.support.rotations import rotation
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"
 

@@ -16,12 +16,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import names, physical_model, rotation
+from factory.api import names, physical_model
 from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
 from factory.floor.geometry.turning import upright
 from factory.support.arrays import Array
-from factory.support.triangles import convex_hull, stl
+from factory.support.meshes.triangles import convex_hull, stl
+from factory.support.rotations import rotation
 from factory.support.xml_writer import add, exact, numbers
 
 if TYPE_CHECKING:

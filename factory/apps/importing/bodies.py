@@ -10,14 +10,14 @@ import numpy as np
 
 from factory.api import Diagnostic, InputError
 from factory.apps.importing.zipping import zipped
-from factory.floor.geometry.glb_reader import Colour
-from factory.floor.geometry.mesh_file import MeshFile
 from factory.floor.geometry.pieces import MOST_PIECES
 from factory.support.arrays import Array, Indices
 from factory.support.decimals import UNITS as LENGTHS
-from factory.support.mesh_bodies import bodies as shells
+from factory.support.meshes.bodies import bodies as shells
+from factory.support.meshes.glb_reader import Colour
+from factory.support.meshes.mesh_file import MeshFile
+from factory.support.meshes.triangles import areas_of, components, is_closed, submeshes, volume_of
 from factory.support.texts import quoted
-from factory.support.triangles import areas_of, components, is_closed, submeshes, volume_of
 
 UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""

@@ -24,11 +24,11 @@ from factory.apps.importing.importer import Imported
 from factory.apps.importing.mesh_files import MeshStore, natural, obj_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
-from factory.support.alike import PartShape, shape_of
 from factory.support.arrays import Array, Indices
 from factory.support.errors import Position
 from factory.support.files import MESH, read_bytes
+from factory.support.meshes.alike import PartShape, shape_of
+from factory.support.meshes.mesh_file import ANEW, UnreadableMesh
 from factory.support.texts import quoted
 from factory.theory.problem.pag import Parameter
 

@@ -19,7 +19,7 @@ from factory.floor.geometry.overlap import Common, drawn, overlap_of
 from factory.floor.geometry.overlapping import near_pairs
 from factory.floor.geometry.touching_groups import groups_of
 from factory.support.arrays import Array
-from factory.support.mesh_bodies import connected
+from factory.support.meshes.bodies import connected
 
 LARGER = 50.0
 """A part that is more than this many times larger than the largest other part, or smaller than the

@@ -16,7 +16,7 @@ from factory.floor.geometry.decomposition import FULL
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
-from factory.support.triangles import is_closed
+from factory.support.meshes.triangles import is_closed
 from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"

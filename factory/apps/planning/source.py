@@ -19,7 +19,6 @@ from factory.api import (
     Template,
     load_pag,
     product_geometry,
-    rotation,
 )
 from factory.apps.importing import Imported, Options, import_product
 from factory.apps.importing.alike import alike
@@ -33,14 +32,15 @@ from factory.apps.planning.faults import check_in_place, check_places, raise_if_
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
 from factory.floor.geometry.decomposition import can_decompose
-from factory.floor.geometry.mesh_file import ANEW
 from factory.floor.geometry.overlap import drawn
-from factory.support.alike import shape_of
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean
+from factory.support.meshes.alike import shape_of
+from factory.support.meshes.mesh_file import ANEW
+from factory.support.meshes.triangles import convex_hull
+from factory.support.rotations import rotation
 from factory.support.texts import quoted
-from factory.support.triangles import convex_hull
 from factory.theory.problem.pag import SHAPES
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"

@@ -18,7 +18,7 @@ from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.apps.planning.source import surface
 from factory.apps.planning.writing import planned_product
 from factory.support.arrays import Array
-from factory.support.triangles import normals_of
+from factory.support.meshes.triangles import normals_of
 
 NEAR = 1e-3
 """Faces inside the box of another part, enlarged by this [m], may touch that part."""

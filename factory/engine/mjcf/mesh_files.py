@@ -15,7 +15,7 @@ import numpy as np
 from factory.floor.geometry.insets import inset
 from factory.floor.geometry.meshes import Mesh
 from factory.support.arrays import Array, Indices
-from factory.support.triangles import convex_hull, corner_normals, stl
+from factory.support.meshes.triangles import convex_hull, corner_normals, stl
 
 
 def mesh_file(mesh: Mesh) -> tuple[str, bytes]:

@@ -23,11 +23,11 @@ from factory.floor.geometry.meshes import Mesh, is_flat
 from factory.floor.geometry.overlap import bounded, merged
 from factory.floor.geometry.pieces import FLATNESS, closed_bodies, is_convex
 from factory.floor.geometry.prisms import prisms
-from factory.support.alike import PartShape, motion_between, moved, shape_of
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
-from factory.support.triangles import components, is_closed, joined, normals_of, volume_of
+from factory.support.meshes.alike import PartShape, motion_between, moved, shape_of
+from factory.support.meshes.triangles import components, is_closed, joined, normals_of, volume_of
 from factory.support.version import release
 
 FOLDER = "pieces"

@@ -14,8 +14,8 @@ import numpy as np
 
 from factory.floor.geometry.overlap import merged
 from factory.support.arrays import Array, Indices
-from factory.support.mesh_bodies import connected
-from factory.support.triangles import normals_of
+from factory.support.meshes.bodies import connected
+from factory.support.meshes.triangles import normals_of
 
 LEAST, MOST = np.deg2rad([1.0, 36.5])
 """The angles between two facets of a round surface [rad], which has ten of them at least. Triangles

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.support.arrays import Array, Indices
-from factory.support.triangles import convex_hull, is_closed, volume_of
+from factory.support.meshes.triangles import convex_hull, is_closed, volume_of
 
 if TYPE_CHECKING:
     import trimesh

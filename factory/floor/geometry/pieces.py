@@ -16,8 +16,8 @@ import numpy as np
 
 from factory.floor.geometry.meshes import hull_of
 from factory.support.arrays import Array, Indices
-from factory.support.mesh_bodies import bodies
-from factory.support.triangles import submeshes
+from factory.support.meshes.bodies import bodies
+from factory.support.meshes.triangles import submeshes
 
 ROUND = 5e-6
 """The tolerated protrusion of the polytope round a round body [m]."""

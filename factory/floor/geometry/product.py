@@ -27,9 +27,6 @@ from factory.floor.geometry.limits import (
     too_far,
     value_position,
 )
-from factory.floor.geometry.mending import mended
-from factory.floor.geometry.mesh_file import ANEW, MeshFile, UnreadableMesh
-from factory.floor.geometry.mesh_reader import read_mesh
 from factory.floor.geometry.meshes import (
     SHEETS,
     MassProperties,
@@ -46,7 +43,10 @@ from factory.support.cache import digest, load_arrays, packed, program, store_ar
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
 from factory.support.interruption import side_by_side
-from factory.support.triangles import areas_of
+from factory.support.meshes.mending import mended
+from factory.support.meshes.mesh_file import ANEW, MeshFile, UnreadableMesh
+from factory.support.meshes.mesh_reader import read_mesh
+from factory.support.meshes.triangles import areas_of
 from factory.theory.problem.pag import PAG, SHAPES, Assembly
 
 

@@ -15,6 +15,7 @@ from factory.floor.geometry.pieces import box_piece, cylinder_piece, sphere_piec
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.support.keeping import Keeping
+from factory.support.rotations import rotation
 from factory.theory.problem.pag import Assembly
 
 DENSITY = 1000.0
@@ -204,19 +205,3 @@ def colour(node: Assembly, number: int) -> tuple[float, ...]:
     hue, saturation, value = PALETTE[index]
     red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)
     return (round(red, 3), round(green, 3), round(blue, 3), 1.0)
-
-
-def rotation(quaternion: Array) -> Array:
-    """A rotation matrix (3, 3).
-
-    Args:
-        quaternion: a unit quaternion (4,), w first.
-    """
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -72,8 +72,16 @@ ALLOW_FORM = "write: allow ( peg, frame, 0.0005 ); or, for all pairs: allow ( 0.
 def read_pag(
     text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
-    """The PAG of a text. Mesh paths start at `folder`; they are not followed where that is None.
-    Raises InputError, also where its file or a mesh will be written over."""
+    """The PAG of a text.
+
+    Args:
+        text: the text.
+        templates: the operations that it may name, by name.
+        file: the name of its file.
+        folder: where mesh paths start; they are not followed where it is None.
+
+    Raises InputError, also where its file or a mesh will be written over.
+    """
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}

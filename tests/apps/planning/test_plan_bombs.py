@@ -20,8 +20,8 @@ import trimesh
 from factory.apps.importing.scene_file import read_scene
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.floor.geometry import glb_reader
-from factory.floor.geometry.mesh_file import UnreadableMesh
 from factory.support.errors import FactoryError
+from factory.support.meshes.mesh_file import UnreadableMesh
 from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
 
@@ -135,7 +135,7 @@ READ = """
 import sys
 from pathlib import Path
 from factory.apps.importing.scene_file import read_scene
-from factory.floor.geometry.mesh_file import UnreadableMesh
+from factory.support.meshes.mesh_file import UnreadableMesh
 for name in sys.argv[1:]:
     path = Path(name)
     try:

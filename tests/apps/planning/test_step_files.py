@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from factory.apps.planning.source import read_source
-from factory.support.triangles import volume_of
+from factory.support.meshes.triangles import volume_of
 from factory.theory.lang.template_reader import all_templates
 from tests.command_line import Terminal
 from tests.paths import ROOT

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from factory.support.arrays import Array, Indices
-from factory.support.merging import merged_vertices
+from factory.support.meshes.merging import merged_vertices
 
 __all__ = ["PartShape", "RigidMotion", "motion_between", "shape_of"]
 

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.support.arrays import Array, Indices
-from factory.support.merging import merged_vertices
-from factory.support.triangles import areas_of, joined
+from factory.support.meshes.merging import merged_vertices
+from factory.support.meshes.triangles import areas_of, joined
+
+__all__ = ["ANEW", "EXPECTED", "MeshFile", "UnreadableMesh", "checked"]
 
 EXPECTED = {
     ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",

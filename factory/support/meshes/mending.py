@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.support.arrays import Array, Indices
-from factory.support.triangles import areas_of, components, is_closed
+from factory.support.meshes.triangles import areas_of, components, is_closed
+
+__all__ = ["SLIVERS"]
 
 if TYPE_CHECKING:
     import trimesh

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from factory.support.arrays import Array, Indices
-from factory.support.mesh_bodies import as_they_come, connected
+from factory.support.meshes.bodies import as_they_come, connected
 
 __all__ = [
     "areas_of",
