@@ -50,9 +50,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.embedding import certified as certified
     from factory.floor.layout.exclusions import coordinated as coordinated
-    from factory.floor.layout.guidepath import Box as Box
     from factory.floor.layout.guidepath import Guidepath as Guidepath
-    from factory.floor.layout.guidepath import Point2 as Point2
     from factory.floor.layout.hands.choosing import Hands as Hands
     from factory.floor.layout.hands.hand import Hand as Hand
     from factory.floor.layout.layout import Layout as Layout
@@ -65,13 +63,14 @@ if TYPE_CHECKING:
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
-    from factory.support.bounds import Allowance as Allowance
     from factory.support.bounds import WorldName as WorldName
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
     from factory.support.errors import RunError as RunError
     from factory.support.settings import Settings as Settings
+    from factory.theory.compiler.expanding import Node as Node
+    from factory.theory.compiler.expanding import expand as expand
     from factory.theory.control.laws import Setting as Setting
     from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
@@ -106,6 +105,8 @@ if TYPE_CHECKING:
     from factory.theory.problem.pag import NOPART as NOPART
     from factory.theory.problem.pag import PAG as PAG
     from factory.theory.problem.pag import Assembly as Assembly
+    from factory.theory.problem.pag import Parameter as Parameter
+    from factory.theory.problem.pag import Value as Value
     from factory.theory.problem.plan import Plan as Plan
     from factory.theory.problem.robot_types import Catalogue as Catalogue
     from factory.theory.problem.template import Template as Template
@@ -113,10 +114,10 @@ if TYPE_CHECKING:
 HOMES = {
     "support.errors": "Diagnostic FactoryError InputError RunError",
     "support.settings": "Settings",
-    "support.bounds": "Allowance WorldName",
+    "support.bounds": "WorldName",
     "support.apps": "App",
     "theory.problem.ids": "PlaceId TransitionId",
-    "theory.problem.pag": "Assembly NOPART PAG",
+    "theory.problem.pag": "Assembly NOPART PAG Parameter Value",
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
@@ -136,6 +137,7 @@ HOMES = {
     "theory.plant.factory": "Factory",
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
+    "theory.compiler.expanding": "Node expand",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid",
     "floor.geometry.product": "product_geometry",
@@ -145,7 +147,7 @@ HOMES = {
     "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",
     "floor.layout.embedding": "certified",
-    "floor.layout.guidepath": "Box Guidepath Point2",
+    "floor.layout.guidepath": "Guidepath",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
     "floor.layout.layout": "Layout",

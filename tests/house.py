@@ -371,20 +371,23 @@ def upward_imports(house: House) -> Iterator[str]:
 def tools(house: House) -> dict[str, list[str]]:
     """The tools of `support`, which every layer and every app may use: what `__all__` of its
     modules lists."""
-    lists = {
-        name: ast.literal_eval(node.value)
+    return {
+        name: ast.literal_eval(node.value or ast.List([]))
         for name, module in house.modules.items()
         if module.room == "support"
         for node in module.tree.body
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__"
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        and ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target)
+        == "__all__"
     }
-    return {name: names for name, names in lists.items() if name in house.modules}
 
 
 def unfit_tools(house: House) -> Iterator[str]:
-    """Tools past the most that there may be, tools without a docstring, and imports of their
-    modules from others: a tool knows nothing of factories."""
+    """Tools past the most that there may be, tools without a docstring or that no app uses, and
+    imports of their modules from others: a tool knows nothing of factories."""
     table = tools(house)
+    apps = [module for module in house.modules.values() if module.room.startswith("apps.")]
+    used = {name for module in apps for name in house.names(module)}
     if (count := sum(map(len, table.values()))) > MOST_TOOLS:
         yield f"support: {count} tools; at most {MOST_TOOLS}"
     for home, names in table.items():
@@ -393,6 +396,8 @@ def unfit_tools(house: House) -> Iterator[str]:
         for name in names:
             if not documented(module, name)[1]:
                 yield f"{home}.{name}: no docstring"
+            if f"{home}.{name}" not in used:
+                yield f"{home}.{name}: no app uses it"
 
 
 def reach_ins(house: House) -> Iterator[str]:

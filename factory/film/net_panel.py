@@ -15,8 +15,8 @@ import numpy as np
 from factory.film.colours import operation_colours, robot_colours
 from factory.film.history import History, OperationProgress, Spell
 from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
-from factory.floor.layout.guidepath import Point2
 from factory.support.arrays import Array
+from factory.support.boxes import Point2
 from factory.support.pictures.ink import (
     FAINT,
     FLASH,

@@ -1,4 +1,4 @@
-"""Numbers as they are written, and units of length."""
+"""Numbers as they are written, units of length, and whole millimetres."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 from types import MappingProxyType
 
-__all__ = ["UNITS", "is_number", "number"]
+__all__ = ["UNITS", "is_number", "number", "up"]
 
 UNITS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254})
 """The units of length [m]."""
@@ -30,3 +30,8 @@ def number(word: str, unit: str = "m") -> float | None:
     if unit != "m" and math.isfinite(value):
         value = float(Decimal(word) * Decimal(repr(UNITS[unit])))
     return value if math.isfinite(value) else None
+
+
+def up(length: float) -> float:
+    """The next whole millimetre [m]: rounding up keeps things apart."""
+    return math.ceil(length * 1000 - 1e-6) / 1000

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["environment"]
+__all__: list[str] = []
 
 
 @contextmanager

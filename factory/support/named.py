@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-__all__ = ["Named"]
+__all__: list[str] = []
 
 
 class Named(str):

@@ -10,7 +10,7 @@ from lark import Token
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
-__all__ = ["Findings", "Source", "counted", "near_file", "quoted", "source_of", "where"]
+__all__ = ["Source", "counted", "near_file", "quoted", "source_of", "where"]
 
 FILES = 1000
 """Maximum number of names of a folder that are compared with a missing one."""

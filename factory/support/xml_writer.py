@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree.ElementTree import Element, SubElement
 
-__all__ = ["add", "exact", "fill", "number", "numbers"]
+__all__ = ["add", "exact", "number", "numbers"]
 
 Number = float | int
 

@@ -115,6 +115,8 @@ unfit_tools: support.a imports support.b
 unfit_tools: support.a imports theory.nets.b
   factory/support/a.py: __all__ = []\nfrom factory.theory.nets.b import c
   factory/theory/nets/b.py: c = 1
+unfit_tools: support.a.c: no app uses it
+  factory/support/a.py: __all__: list[str] = ["c"]\nc = 1
 unfit_tools: support.a.c: no docstring
   factory/support/a.py: __all__ = ["c"]\nc = 1
 interface: api.C: twice

@@ -10,7 +10,7 @@ from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Box, Diagnostic, Operation, Point2, RunError, Solid
+from factory.api import Diagnostic, Operation, RunError, Solid
 from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
@@ -20,8 +20,8 @@ from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal
 from factory.apps.arms.reach import Ring, ring_of
 from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.guidepath import hull
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2, hull
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import Box, Diagnostic, Layout, RunError, Solid
+from factory.api import Diagnostic, Layout, RunError, Solid
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
@@ -13,6 +13,7 @@ from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.outfeed import shed_with_uprights
 from factory.support.arrays import Array
+from factory.support.boxes import Box
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""

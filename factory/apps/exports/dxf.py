@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from factory.api import Box, Layout, Point2
+from factory.api import Layout
 from factory.apps.exports.floor_plan import Flat, flat_shapes, stations
 from factory.apps.exports.subject import Subject
 from factory.floor.layout.feeding import feeder_of
+from factory.support.boxes import Box, Point2
 from factory.support.version import optional
 
 FORMAT, TAKES, RAILS = "dxf", "pag", True

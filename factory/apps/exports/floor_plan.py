@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Box, Layout, Point2, Solid, regions
+from factory.api import Layout, Solid, regions
 from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.floor.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Extent
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.tiles import tiles_of
+from factory.support.boxes import Box, Extent, Point2
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 JUNCTION = 0.008

@@ -10,20 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from factory.api import (
-    Gear,
-    GearNet,
-    MarkedNet,
-    Place,
-    Point2,
-    Project,
-    Transition,
-    coordinated,
-    marked,
-)
+from factory.api import Gear, GearNet, MarkedNet, Place, Project, Transition, coordinated, marked
 from factory.apps.drawing.markup import escape, quoteattr
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
+from factory.support.boxes import Point2
 from factory.support.errors import Position
 from factory.theory.nets.threaded import Redistribution
 

@@ -15,10 +15,9 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Template
+from factory.api import NOPART, PAG, Node, Template, expand
 from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
-from factory.theory.compiler.expanding import Node, expand
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import inf
 
-from factory.api import NOPART, Box, Factory, Operation, Pace
+from factory.api import NOPART, Factory, Operation, Pace
 from factory.apps.few_robots.folding import Line
+from factory.support.boxes import Box
 from factory.theory.compiler.folding import begun_by, kind_of, sides_of
 
 BETWEEN = 0.08

@@ -7,17 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
-from factory.api import (
-    Allowance,
-    Box,
-    Factory,
-    Operation,
-    Pace,
-    Plan,
-    Product,
-    Project,
-    payload_boxes,
-)
+from factory.api import Factory, Operation, Pace, Plan, Product, Project, expand, payload_boxes
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
@@ -27,7 +17,8 @@ from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
 from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.layout.hands.misses import NoGrip
-from factory.theory.compiler.expanding import expand
+from factory.support.allowance import Allowance
+from factory.support.boxes import Box
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""

@@ -18,10 +18,10 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.api import PAG, Assembly, Box, Pace, Plan, Template
+from factory.api import PAG, Assembly, Node, Pace, Plan, Template, expand
 from factory.apps.few_robots.lines import Admitted
 from factory.floor.mating.findings import Level
-from factory.theory.compiler.expanding import Node, expand
+from factory.support.boxes import Box
 
 APART = 0.06
 """Length of guidepath from one station to the next, beside the sub-assembly [m]."""

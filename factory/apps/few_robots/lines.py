@@ -12,11 +12,11 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Box, Catalogue, Factory, Finder, Pace, Plan, Product, marked
+from factory.api import Catalogue, Factory, Finder, Node, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
 from factory.floor.mating.findings import Level
-from factory.theory.compiler.expanding import Node
+from factory.support.boxes import Box
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)

@@ -14,12 +14,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
 
-from factory.api import Allowance, Diagnostic, InputError, Plan, Project
+from factory.api import Diagnostic, InputError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimator
 from factory.apps.few_robots.folding import kept_apart, lines_of
+from factory.support.allowance import Allowance
 
 CHANGES = 60
 """Number of changes in a row without improvement after which the search ends."""

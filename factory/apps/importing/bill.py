@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
 
-from factory.api import Diagnostic, InputError
+from factory.api import Diagnostic, InputError, Value
 from factory.apps.importing.bill_header import Header, HeaderReader
 from factory.apps.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.apps.importing.part_maker import PartMaker, Placement
@@ -18,7 +18,6 @@ from factory.support.decimals import number
 from factory.support.errors import Position
 from factory.support.texts import Source, quoted
 from factory.theory.lang.values import GEOMETRY
-from factory.theory.problem.pag import Value
 
 MOST_COPIES = 10_000
 """The greatest quantity of a row."""

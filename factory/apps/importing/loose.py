@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import PAG, Diagnostic, InputError
+from factory.api import PAG, Diagnostic, InputError, Parameter
 from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
 from factory.apps.importing.colours import colours_by_size, kinds_of
@@ -30,7 +30,6 @@ from factory.support.files import MESH, read_bytes
 from factory.support.meshes.alike import PartShape, shape_of
 from factory.support.meshes.mesh_file import ANEW, UnreadableMesh
 from factory.support.texts import quoted
-from factory.theory.problem.pag import Parameter
 
 
 def bodies_in(path: Path) -> Bodies:

@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Demand, LayoutTable, WorldName
+from factory.api import Demand, LayoutTable, RunVerdict, WorldName
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
-from factory.engine.record.verdict import check_kept_figures
 from factory.support.tables import LARGE, value_of
 
 HEADER = "header"
@@ -175,6 +174,6 @@ def _check_ragged(name: str, arrays: Arrays, count: int) -> None:
 
 def check_figures(figures: Any) -> None:
     """Raises ValueError where the figures do not have the form of `kept_figures`, with HEADER."""
-    check_kept_figures(figures)
+    RunVerdict.check_kept_figures(figures)
     if not isinstance(figures.get(HEADER, ""), str):
         raise ValueError(f"its figure '{HEADER}' is not a text")

@@ -26,6 +26,7 @@ from factory.api import (
     Project,
     Recordable,
     Recorder,
+    RunVerdict,
     State,
     Undone,
 )
@@ -36,7 +37,6 @@ from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.verdict import kept_figures
 from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.files import unwritten
@@ -220,7 +220,7 @@ class LogWriter(Recorder):
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.simulation.figures()) is not None:
             header, _ = header_in(content_of(self.path, RECORD))
-            kept = {**kept_figures(figures), HEADER: digest_of(header)}
+            kept = {**RunVerdict.kept_figures(figures), HEADER: digest_of(header)}
             texts["figures"] = json.dumps(kept)
         if (account := self.simulation.state().account) is not None:
             texts["failures"] = json.dumps(table_of(account.report()))

@@ -17,13 +17,14 @@ from functools import cached_property
 from itertools import product
 from math import ceil, inf
 
-from factory.api import Allowance, FactoryError, Plan, Project
+from factory.api import FactoryError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate, Estimator
 from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.search import SINGLE, Search
 from factory.apps.pareto.front import Ended, FrontPoint, ParetoFront, candidates_front, undominated
+from factory.support.allowance import Allowance
 
 WIDE = 2
 """Effort for a front, over that of a search for one factory."""

@@ -11,7 +11,6 @@ from time import perf_counter
 import numpy as np
 
 from factory.api import (
-    Allowance,
     FactoryError,
     Ground,
     InputError,
@@ -36,6 +35,7 @@ from factory.apps.planning.searching import Aim
 from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
+from factory.support.allowance import Allowance
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

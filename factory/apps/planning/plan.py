@@ -10,16 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import (
-    Allowance,
-    Diagnostic,
-    InputError,
-    Pace,
-    Project,
-    Settings,
-    Template,
-    all_templates,
-)
+from factory.api import Diagnostic, InputError, Pace, Project, Settings, Template, all_templates
 from factory.apps.planning.blocking import (
     CLASHES,
     DEEPER,
@@ -54,6 +45,7 @@ from factory.apps.planning.standing import feet
 from factory.apps.planning.subsets import MOST, stances
 from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
+from factory.support.allowance import Allowance
 from factory.support.arrays import Array
 from factory.support.errors import did_you_mean
 

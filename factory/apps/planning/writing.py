@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Template, product_geometry, write_pag
+from factory.api import PAG, Assembly, Template, expand, product_geometry, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
@@ -19,7 +19,6 @@ from factory.apps.planning.titles import Titles
 from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
-from factory.theory.compiler.expanding import expand
 from factory.theory.problem.pag import AllowedOverlap
 
 Unit = TypeVar("Unit", bound=str | int)

@@ -17,10 +17,10 @@ from factory.api import Layout, Pace
 from factory.apps.platen.placing import Floor, Placing
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.branches import branch_of
-from factory.floor.layout.dimensions import up
 from factory.floor.layout.feeding import cleared
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.way import Bend, rounding_for
+from factory.support.decimals import up
 
 TRIES, EFFORT = 220, 120_000
 """Changes that are tried for each guidepath, and at most robots times changes: each takes a time

@@ -17,7 +17,6 @@ from factory.api import (
     Hands,
     Layout,
     Pace,
-    Point2,
     Robot,
     Settings,
     all_templates,
@@ -30,6 +29,7 @@ from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
+from factory.support.boxes import Point2
 from factory.support.collector import collector_paused
 
 WITHIN = 1.05

@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from factory.api import Layout, MarkedNet, Point2, coordinated
+from factory.api import Layout, MarkedNet, coordinated
 from factory.apps.revise.pairing import Pairing
+from factory.support.boxes import Point2
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from factory.apps.revise.pins import Pins
 from factory.floor.layout.branches import branch_of
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.crowding import crowding_faults
-from factory.floor.layout.dimensions import TOOL_TRAVEL, up
+from factory.floor.layout.dimensions import TOOL_TRAVEL
 from factory.floor.layout.drafting import LayoutDraft
 from factory.floor.layout.optimising import arrange, shape_of
 from factory.floor.layout.packing import Task
@@ -36,6 +36,7 @@ from factory.floor.layout.shapes import Shape, headings
 from factory.floor.layout.sides import admissible
 from factory.floor.layout.stops import carried
 from factory.floor.layout.stretching import Stretched
+from factory.support.decimals import up
 
 STEP = 0.02
 """Stations for what is new are so far apart [m]."""

@@ -14,10 +14,10 @@ from factory.floor.geometry.fused_bodies import FusedBodies, Inside
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.guidepath import Point2
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
+from factory.support.boxes import Point2
 from factory.support.xml_writer import add, exact, numbers
 
 PARKED = -0.6

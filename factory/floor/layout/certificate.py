@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.guidepath import Box
+from factory.support.boxes import Box
 from factory.support.errors import Diagnostic, Position
 from factory.support.showing import Told
 from factory.theory.nets.coordinated import Past

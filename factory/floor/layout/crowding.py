@@ -29,10 +29,10 @@ from factory.floor.layout.certificate import (
 )
 from factory.floor.layout.clearance import MOST
 from factory.floor.layout.crossings import embedding_faults, near
-from factory.floor.layout.guidepath import Box
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.meeting import TOLERANCE, meeting_faults
 from factory.floor.layout.sweeps import piles_of, regions
+from factory.support.boxes import Box
 from factory.theory.problem.ids import OperationId
 
 

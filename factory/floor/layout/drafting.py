@@ -19,14 +19,16 @@ from factory.floor.layout.certificate import (
     SHED,
     Region,
 )
-from factory.floor.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
-from factory.floor.layout.guidepath import Box, Guidepath
+from factory.floor.layout.dimensions import BEHIND, SIDE, WALL, Clearance
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Point3
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import Shape, headings
 from factory.floor.layout.stretching import Stretched
 from factory.floor.layout.sweeps import regions
 from factory.floor.layout.visits import visits_of
+from factory.support.boxes import Box
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 
 

@@ -22,12 +22,13 @@ from factory.floor.layout.certificate import (
     MAST_BODY,
 )
 from factory.floor.layout.clearance import certify
-from factory.floor.layout.dimensions import ARMS, CARRIAGES, up
-from factory.floor.layout.guidepath import Extent
+from factory.floor.layout.dimensions import ARMS, CARRIAGES
 from factory.floor.layout.hands.leaving import SPARE
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.sweeps import regions
 from factory.floor.layout.way import Bend
+from factory.support.boxes import Extent
+from factory.support.decimals import up
 from factory.support.errors import Diagnostic, RunError
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.robot_bodies import MAST

@@ -11,12 +11,14 @@ from types import MappingProxyType
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.certificate import Certificate
 from factory.floor.layout.chains import Chains, JointCurves
-from factory.floor.layout.dimensions import BEHIND, BELT_GAP, PAYLOAD, PLAY, SIDE, TRAY, WALL, up
-from factory.floor.layout.guidepath import Box, Extent, Guidepath, Point2, hull, moved
+from factory.floor.layout.dimensions import BEHIND, BELT_GAP, PAYLOAD, PLAY, SIDE, TRAY, WALL
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.mounted import Mount, grip_of
 from factory.floor.layout.visits import LEAST, Visit, Visits, beyond_station, stop_offset
 from factory.floor.layout.way import Ways
+from factory.support.boxes import Box, Extent, Point2, hull, moved
+from factory.support.decimals import up
 from factory.support.keeping import Keeping
 from factory.support.showing import Pictured
 from factory.theory.plant.approaches import Overlap

@@ -22,7 +22,6 @@ from factory.floor.layout.certificate import Region
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.drafting import LayoutDraft
 from factory.floor.layout.durations import Pace
-from factory.floor.layout.guidepath import Box, Point2, hull
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import bare
 from factory.floor.layout.layout import Layout
@@ -43,6 +42,7 @@ from factory.floor.layout.shapes import (
 from factory.floor.layout.sides import admissible, admitted
 from factory.floor.layout.stretching import Stretched, outgoing, stretch
 from factory.floor.layout.sweeps import regions
+from factory.support.boxes import Box, Point2, hull
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 

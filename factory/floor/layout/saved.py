@@ -10,11 +10,12 @@ import numpy as np
 from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.embedding import certified
-from factory.floor.layout.guidepath import Box, Guidepath
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import Visit
+from factory.support.boxes import Box
 from factory.support.errors import RunError
 from factory.theory.plant.factory import Factory
 

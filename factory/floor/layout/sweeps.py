@@ -38,12 +38,12 @@ from factory.floor.layout.dimensions import (
     SIDE,
 )
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box, Extent, Point2, hull, moved
 from factory.floor.layout.hands.hand import ROOT
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Extent, Point2, hull, moved
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST

@@ -7,11 +7,11 @@ from math import ceil, floor
 import numpy as np
 import shapely
 
-from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.sweeps import regions
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2
 
 SHIFTS = 12
 """So many places of the tiles' edges are tried along each axis."""

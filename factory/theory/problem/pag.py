@@ -21,11 +21,18 @@ SHAPES = ("mesh", "box", "cylinder", "sphere")
 """Parameters that give a part a shape."""
 
 Value = float | str | tuple[float, ...]
+"""The value of a parameter: a number, a word or a vector."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A keyword argument of an operation, with the place of its value in the text."""
+    """A keyword argument of an operation.
+
+    Attributes:
+        name: its name.
+        value: its value.
+        position: the place of its value in the text.
+    """
 
     name: str
     value: Value

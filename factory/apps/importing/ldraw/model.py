@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Diagnostic
+from factory.api import Diagnostic, Parameter
 from factory.apps.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.apps.importing.ldraw.lines import (
     INHERITED,
@@ -33,7 +33,6 @@ from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import Placement
 from factory.support.arrays import Array
 from factory.support.texts import quoted
-from factory.theory.problem.pag import Parameter
 
 DENSITY = 1050.0
 """Density of ABS [kg/m³]."""
