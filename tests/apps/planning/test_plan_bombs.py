@@ -19,8 +19,8 @@ import trimesh
 
 from factory.apps.importing.scene_file import read_scene
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.floor.geometry import glb_reader
 from factory.support.errors import FactoryError
+from factory.support.meshes import glb_reader
 from factory.support.meshes.mesh_file import UnreadableMesh
 from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
