@@ -79,7 +79,9 @@ if TYPE_CHECKING:
     from factory.theory.lang.pag_reader import read_pag as read_pag
     from factory.theory.lang.source import read_text as read_text
     from factory.theory.lang.template_reader import all_templates as all_templates
+    from factory.theory.lang.template_reader import read_template as read_template
     from factory.theory.lang.writer import write_pag as write_pag
+    from factory.theory.lang.writer import write_template as write_template
     from factory.theory.nets.gears import Gear as Gear
     from factory.theory.nets.gears import GearNet as GearNet
     from factory.theory.nets.marked import NONE as NONE
@@ -100,8 +102,6 @@ if TYPE_CHECKING:
     from factory.theory.plant.factory import Factory as Factory
     from factory.theory.plant.operation import Operation as Operation
     from factory.theory.plant.robot import Robot as Robot
-    from factory.theory.problem.ids import PlaceId as PlaceId
-    from factory.theory.problem.ids import TransitionId as TransitionId
     from factory.theory.problem.pag import NOPART as NOPART
     from factory.theory.problem.pag import PAG as PAG
     from factory.theory.problem.pag import Assembly as Assembly
@@ -116,15 +116,14 @@ HOMES = {
     "support.settings": "Settings",
     "support.bounds": "WorldName",
     "support.apps": "App",
-    "theory.problem.ids": "PlaceId TransitionId",
     "theory.problem.pag": "Assembly NOPART PAG Parameter Value",
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
     "theory.lang.pag_reader": "load_pag read_pag",
     "theory.lang.source": "read_text",
-    "theory.lang.writer": "write_pag",
-    "theory.lang.template_reader": "all_templates",
+    "theory.lang.writer": "write_pag write_template",
+    "theory.lang.template_reader": "all_templates read_template",
     "theory.nets.gears": "Gear GearNet",
     "theory.nets.marked": "MarkedNet NONE marked token_free",
     "theory.nets.petri": "Marking PetriNet Place Transition",

@@ -137,9 +137,11 @@ class Timestep(click.ParamType[float | str]):
     name = "number|auto"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        from factory.support.settings import is_auto
+        from factory.support.settings import Settings
 
-        return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
+        return (
+            value if Settings.is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
+        )
 
 
 class Branch(click.ParamType[tuple[str, int]]):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.support.settings import MOST_BRANCHES, RANGES, WHOLE, Settings, is_auto, wrong_type
+from factory.support.settings import MOST_BRANCHES, Settings, wrong_type
 from factory.support.toml_files import key_position, read_toml
 
 NAME = "factory.toml"
@@ -68,9 +68,12 @@ class Defaults:
 
     def settings(self) -> Settings:
         """The settings of the file, with the built-in defaults for the others."""
-        values = {k: v for k, v in self.values.items() if k in RANGES}
+        values = {k: v for k, v in self.values.items() if k in Settings.RANGES}
         return Settings().with_options(
-            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in values.items()}
+            {
+                k: v if k in Settings.WHOLE or Settings.is_auto(k, v) else float(v)
+                for k, v in values.items()
+            }
         )
 
     def options(self) -> dict[str, Any]:
@@ -128,7 +131,7 @@ def load_defaults(path: Path) -> Defaults:
 
 def _fault(key: str, value: object) -> Diagnostic | None:
     """What is wrong with a key and its value."""
-    if key in RANGES:
+    if key in Settings.RANGES:
         return wrong_type(key, value)
     if key in (LINES, TEES):
         example = f'{"side" if key == LINES else "stem"} = ["part2", "part3"]'
@@ -140,7 +143,7 @@ def _fault(key: str, value: object) -> Diagnostic | None:
         example = 'left = { type = "six", labels = ["part2"] }'
         return _fault_of_table(key, value, lambda row: isinstance(row, dict), "tables", example)
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, TEES, PARALLEL, ARMS], "keys")
+        hint = did_you_mean(key, [*Settings.RANGES, *OPTIONS, LINES, TEES, PARALLEL, ARMS], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)

@@ -13,7 +13,7 @@ from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.apps.drawing.tables import Tabular, titled
 from factory.engine.timing.pool import part_pool
 from factory.engine.timing.timed import SAME
-from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.engine.timing.timing import Change
 from factory.support.errors import did_you_mean, usage_error
 
 MOST: Mapping[str, float] = {"faster": 1e6, "shorter": 100.0}
@@ -131,7 +131,7 @@ def least_wip(timing: Timing) -> int:
     low, high = 0, max(part_pool(timing.factory).values()) * timing.factory.period
     while high - low > 1:
         middle = (low + high) // 2
-        enough = timed_net(timing, AS_IT_IS, middle).pace <= full * (1 + SAME)
+        enough = timed_net(timing, wip=middle).pace <= full * (1 + SAME)
         low, high = (low, middle) if enough else (middle, high)
     return high
 
@@ -226,7 +226,7 @@ def analyse(
 
     Raises InputError if `wip` is below 1 or a mode cannot reach its goal.
     """
-    net = timed_net(timing, AS_IT_IS, wip)
+    net = timed_net(timing, wip=wip)
     products = flow(timing, net, units)
     return Analysis(
         timing,

@@ -12,7 +12,7 @@ import numpy as np
 from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits
 from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
-from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.engine.timing.timing import Change
 from factory.support.arrays import Array
 from factory.theory.nets.earliest import earliest_firings
 
@@ -104,11 +104,12 @@ class TimedNet(Timed):
         return earliest_firings(self.net, self.seconds, cycles, self.first, self.ready)
 
 
-def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> TimedNet:
+def timed_net(timing: Timing, change: Change | None = None, wip: int | None = None) -> TimedNet:
     """The timed net of a factory with a change of its robots and a bound on copies of each part.
 
     Raises InputError (BadValue) where `wip` is below 1.
     """
+    change = change or Change()
     made, factory = timed(timing, change, wip), timing.factory
     places, tokens, seconds = [*made.net.net.places], [*made.net.tokens], [*made.seconds]
     named = _gears(timing, seconds, tokens, made.ways)

@@ -44,6 +44,9 @@ WRIST_BACK = 0.2
 FAR_OFF = 9.0
 """Longer than any line [m]."""
 
+SIDES = (1.0, -1.0)
+"""The sides of the line on which arms stand."""
+
 
 @dataclass(frozen=True, eq=False)
 class Arrangement(Handling):
@@ -345,7 +348,3 @@ class Arrangement(Handling):
         c, s = cos(-stand.yaw), sin(-stand.yaw)
         x, y, z = place - stand.place
         return np.array([c * x - s * y, s * x + c * y, z])
-
-
-SIDES = (1.0, -1.0)
-"""The sides of the line on which arms stand."""

@@ -17,9 +17,12 @@ from factory.apps.exports.stock import Scale, scales_of
 from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.machines import presences
-from factory.floor.layout.presence import Presence, Span
+from factory.floor.layout.presence import Presence
 
 Json = dict[str, Any]
+
+Span = tuple[float, float]
+"""Between which coordinates an axis is [m]."""
 
 
 def ways(model: Model) -> Json:

@@ -12,10 +12,11 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, Gear, MarkedNet, PlaceId, TransitionId, listing
+from factory.api import NONE, Gear, MarkedNet, listing
 from factory.theory.nets.composition import MOST, no_gear_net, notation
 from factory.theory.nets.marked import MANY
 from factory.theory.nets.verdict import Defect
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:

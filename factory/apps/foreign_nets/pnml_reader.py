@@ -12,24 +12,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from factory.api import (
-    NONE,
-    Gear,
-    GearNet,
-    MarkedNet,
-    PetriNet,
-    Place,
-    PlaceId,
-    Transition,
-    TransitionId,
-    read_text,
-)
+from factory.api import NONE, Gear, GearNet, MarkedNet, PetriNet, Place, Transition, read_text
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
 from factory.theory.nets.composition import compose
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 N = TypeVar("N", bound=int)
 Events = list[TransitionId]

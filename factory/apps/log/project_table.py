@@ -30,14 +30,15 @@ from factory.api import (
     all_templates,
     load_catalogue,
     read_pag,
+    read_template,
     write_pag,
+    write_template,
 )
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
 from factory.support.tables import MISFITS, misfit, table_of, value_of
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.lang import read_template, write_template
 from factory.theory.nets.history import firings
 
 

@@ -23,7 +23,6 @@ from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.mating.overlaps import Overlaps
-from factory.floor.mating.paths import TOLERANCE
 from factory.support.arrays import Array, Indices
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
@@ -254,7 +253,7 @@ def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Block
     locks, pressed = levels >= LOCKED, np.zeros((count, count), bool)
     locked = locks.sum(axis=0)
     touch |= near & (locked + locked.T >= GUIDED)
-    drawn_in = overlaps.depths.finished > TOLERANCE
+    drawn_in = overlaps.drawn_in
     pressed[unit[overlaps.one[drawn_in]], unit[overlaps.other[drawn_in]]] = True
     graphs = Blocking(labels, levels, locks, touch, *bounds, depths, hidden)
     return replace(graphs, near=near, pressed=pressed | pressed.T)
@@ -285,9 +284,7 @@ def _hidden(overlaps: Overlaps, unit: Indices, labels: Sequence[str]) -> tuple[O
     """The parts of two units that overlap in the finished product according to hulls alone; any
     axis shows them."""
     finished = overlaps.depths.finished
-    drawn_in = (
-        overlaps.rough & (finished > TOLERANCE) & (unit[overlaps.one] != unit[overlaps.other])
-    )
+    drawn_in = overlaps.rough & overlaps.drawn_in & (unit[overlaps.one] != unit[overlaps.other])
     rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
     one, other = (array[rows].tolist() for array in (overlaps.one, overlaps.other))
     pairs = zip(one, other, finished[rows].tolist(), strict=True)

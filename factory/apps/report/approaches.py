@@ -11,7 +11,7 @@ from factory.api import Finder, Node, Operation, Product
 from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
 from factory.theory.compiler.expanding import nodes_of
-from factory.theory.plant.approaches import Approach, Pair
+from factory.theory.plant.approaches import Approach
 
 COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 
@@ -91,7 +91,7 @@ def _room(room: float | None) -> str:
     return f"overlap of {-millimetres:.2f} mm as drawn"
 
 
-def _left_out(pairs: set[Pair]) -> str:
+def _left_out(pairs: set[tuple[str, str]]) -> str:
     """The number of pairs, and a list."""
     if not pairs:
         return "none"

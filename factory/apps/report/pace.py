@@ -13,7 +13,6 @@ from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.monitor.recount import worst
 from factory.apps.report.recording import Recording
 from factory.engine.simulation.run import busy_times, mean_interval
-from factory.theory.plant.approaches import Pair
 
 
 def fidelity(recording: Recording) -> dict[str, float | None]:
@@ -29,7 +28,7 @@ def fidelity(recording: Recording) -> dict[str, float | None]:
     }
 
 
-def excluded(recording: Recording) -> tuple[Pair, ...]:
+def excluded(recording: Recording) -> tuple[tuple[str, str], ...]:
     """The pairs of parts that are excluded from contact in the recorded model."""
     m = recording.motion.m
     pairs = (names.excluded(m.exclude(i).name) for i in range(m.nexclude))

@@ -21,6 +21,7 @@ from factory.api import (
     load_catalogue,
     proved,
     write_pag,
+    write_template,
 )
 from factory.apps.runs.options import check_ideal
 from factory.apps.sweep.grid import DEFAULTS, SETTINGS, GridAxis, Point, Value
@@ -28,7 +29,6 @@ from factory.support.errors import usage_error
 from factory.support.resources import mjcf_folder
 from factory.support.tables import table_of
 from factory.support.version import __version__
-from factory.theory.lang.writer import write_template
 
 
 @dataclass(frozen=True)

@@ -33,10 +33,6 @@ from factory.support.version import release
 FOLDER = "pieces"
 """The folder of decompositions in the user's cache."""
 
-FULL = 0.98
-"""A closed mesh that fills more than this share of its hull is represented by it, unless it has a
-hole through it, or another part stands in it."""
-
 CONCAVITY, SLENDER = (0.02, 0.05), 0.1
 """Bounds on the deviation that CoACD allows (its `threshold`), in units of about half the longest
 edge of the mesh's box, and the bound relative to the middle edge."""
@@ -102,7 +98,7 @@ def _pieces(body: Mesh, stood_in: bool) -> tuple[Array, ...]:
     if not _fills(body, 1 - FLATNESS):
         is_entered = stood_in or has_hole(body)
         pieces = prisms(body.vertices, body.faces) if is_entered else ()
-        if not pieces and can_decompose() and (is_entered or not _fills(body, FULL)):
+        if not pieces and can_decompose() and (is_entered or not _fills(body, Mesh.FULL)):
             pieces = _decomposed(body)
         pieces = tuple(piece for piece in pieces if not is_flat(piece))
         return pieces or (body.vertices,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -42,12 +42,16 @@ class Mesh:
     """A triangle mesh in its own frame.
 
     Attributes:
+        FULL: a closed mesh that fills more than this share of its hull is represented by it, unless
+            it has a hole through it, or another part stands in it.
         name: of its file.
         vertices: [m] (n, 3).
         faces: vertices of each triangle (m, 3).
         pieces: vertices of the convex bodies that collide in its place [m] (k, 3) each; empty if
             its hull does.
     """
+
+    FULL: ClassVar[float] = 0.98
 
     name: str
     vertices: Array = field(repr=False)

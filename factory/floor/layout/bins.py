@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -28,8 +29,8 @@ from factory.theory.problem.pag import NOPART
 PLATE = 0.002
 """Thickness of a bin's plates [m]."""
 
-TOP, SILL = 0.06, 0.03
-"""How high a bin's plates are, and the one over which things come in [m]."""
+SILL = 0.03
+"""How high the plate of a bin is over which things come in [m]."""
 
 SLACK = 0.02
 """How much wider than what falls into it a bin is, on each side [m]."""
@@ -44,7 +45,10 @@ AHEAD, ASIDE = range(-1, 5), range(16)
 @dataclass(frozen=True, slots=True)
 class Bin:
     """The bin of a robot (index): its outer `box`, and the `labels` for which it is wide enough.
-    `near`: the side over which things come in, a unit vector from the bin to the lane."""
+    `near`: the side over which things come in, a unit vector from the bin to the lane; `TOP`: how
+    high its plates are [m]."""
+
+    TOP: ClassVar[float] = 0.06
 
     robot: int
     box: Box
@@ -146,7 +150,7 @@ def _size(box: Box) -> float:
 
 def _stands(one: Bin) -> list[Region]:
     return [
-        Region(one.robot, layer, BIN_BODY, one.box, (0.0, TOP), min(one.labels))
+        Region(one.robot, layer, BIN_BODY, one.box, (0.0, one.TOP), min(one.labels))
         for layer in (CARRIAGES, ARMS)
     ]
 

@@ -50,6 +50,16 @@ class Region:
     label: str = ""
     mode: int = ALWAYS
 
+    @property
+    def is_payload(self) -> bool:
+        """Whether it is swept by what a robot carries."""
+        return self.kind == PAYLOAD_BODY
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether its robot is there in the mode of one operation only."""
+        return self.mode != ALWAYS
+
     def named(self, factory: Factory) -> str:
         """The region in words."""
         if self.kind in (OUTFEED, SHED):

@@ -11,7 +11,6 @@ from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import fed_of
 from factory.floor.layout.branches import carriers, delivery
 from factory.floor.layout.certificate import (
-    ALWAYS,
     ARM_BODY,
     CARRIAGE_BODY,
     MAST_BODY,
@@ -120,7 +119,7 @@ def _spare(layout: Layout) -> float:
         region
         for region in regions(layout)
         if region.kind not in (OUTFEED, SHED)
-        and (region.robot != 0 or region.mode == ALWAYS)
+        and (region.robot != 0 or not region.is_coupled)
         and not _runs_under(region)
     ]
     for start, _, low, high in (layout.outfeed, layout.shed):

@@ -13,7 +13,7 @@ from itertools import permutations
 from math import ceil
 
 from factory.floor.geometry.solids import Product
-from factory.floor.layout.certificate import ALWAYS, LOADS, Certificate, Fault, Region
+from factory.floor.layout.certificate import LOADS, Certificate, Fault, Region
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.durations import Pace
@@ -99,7 +99,7 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
         stem = len(pair) == 2 and layout.share_stem(*pair)
         for robot, other in permutations(pair) if len(pair) == 2 and not stem else ():
             path = layout.guidepaths[robot]
-            loads = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
+            loads = [r.box for r in carried if r.robot == robot and not r.is_coupled]
             passing = [r.box for r in carried if r.robot == other]
             if loads and passing:
                 further = path.frame(hull(loads))[1] - path.frame(hull(passing))[0]

@@ -16,7 +16,6 @@ from types import MappingProxyType
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.branches import branch_of, carriers
 from factory.floor.layout.certificate import (
-    ALWAYS,
     ARM_BODY,
     CARRIAGE_BODY,
     MAST_BODY,
@@ -162,7 +161,7 @@ def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
         if (
             region.robot in branch
             and not is_robots
-            and (region.robot != robot or region.mode == ALWAYS)
+            and (region.robot != robot or not region.is_coupled)
         ):
             xlo, xhi, ylo, yhi = region.box
             yield region.layer, path.frame((xlo - x, xhi - x, ylo - y, yhi - y))

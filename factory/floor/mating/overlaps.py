@@ -78,6 +78,11 @@ class Overlaps:
         levels = [Level.STRICT, Level.NO_DEEPER, Level.LEFT_OUT]
         return np.select(conditions, levels, Level.BLOCKED), clashing
 
+    @property
+    def drawn_in(self) -> Flags:
+        """Which pairs (n,) overlap in the finished product."""
+        return np.asarray(self.depths.finished > TOLERANCE)
+
     @cached_property
     def deeper(self) -> NDArray[np.bool_]:
         """Which pairs (n, 2) get deeper into each other on the way from either side than they are

@@ -28,9 +28,15 @@ Folder = str | os.PathLike[str]
 
 @lru_cache(maxsize=256)
 def read_template(text: str, file: str = "<text>") -> Template:
-    """The template of a text. Raises InputError with every error of the text. `load_templates`
-    checks the templates named by `further`, `instead` and `brought`. A text is parsed once a
-    process."""
+    """The template of a text. `load_templates` checks the templates named by `further`, `instead`
+    and `brought`. A text is parsed once a process.
+
+    Args:
+        text: the text.
+        file: the name of its file.
+
+    Raises InputError with every error of the text.
+    """
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()
