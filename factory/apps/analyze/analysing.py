@@ -12,7 +12,6 @@ from factory.apps.analyze.measured import Comparison, RunRecord, compare
 from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.apps.drawing.tables import Tabular, titled
 from factory.engine.timing.pool import part_pool
-from factory.engine.timing.timed import SAME
 from factory.engine.timing.timing import Change
 from factory.support.errors import did_you_mean, usage_error
 
@@ -127,11 +126,11 @@ def scenario(timing: Timing, words: str, change: Change, wip: int | None) -> Sce
 def least_wip(timing: Timing) -> int:
     """The least bound on copies of each part with the full pace, by bisection: the cycle time never
     grows with the bound."""
-    full = timed_net(timing).pace
+    net = timed_net(timing)
     low, high = 0, max(part_pool(timing.factory).values()) * timing.factory.period
     while high - low > 1:
         middle = (low + high) // 2
-        enough = timed_net(timing, wip=middle).pace <= full * (1 + SAME)
+        enough = timed_net(timing, wip=middle).pace <= net.pace * (1 + net.SAME)
         low, high = (low, middle) if enough else (middle, high)
     return high
 

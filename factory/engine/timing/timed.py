@@ -6,11 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
 from factory.engine.timing.cycle_time import CycleTime, cycle_time
 from factory.engine.timing.pool import with_wip
 from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.theory.nets.earliest import earliest_firings
@@ -18,18 +20,15 @@ from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
 from factory.theory.problem.ids import is_end
 
-SAME = 1e-9
-"""Relative difference up to which times are equal."""
-
-OUTFEED, FEEDER = "outfeed", "feeder"
-"""What machines are called that are no robots, as a bottleneck."""
-
 
 @dataclass(frozen=True)
 class Timed:
     """The timed net: a marked graph with the time that a token stays in each place.
 
     Attributes:
+        OUTFEED: what the outfeed is called, as a bottleneck.
+        FEEDER: what a feeder is called, before the label of its part.
+        SAME: relative difference up to which times are equal.
         timing: the delays of the factory's operations.
         net: the net with its tokens.
         seconds: time in each place [s].
@@ -38,6 +37,10 @@ class Timed:
         wip: the most units inside at once; None for no bound.
         owners: by place, the robots (index) that are in it.
     """
+
+    OUTFEED: ClassVar[str] = "outfeed"
+    FEEDER: ClassVar[str] = "feeder"
+    SAME: ClassVar[float] = 1e-9
 
     timing: Timing
     net: MarkedNet
@@ -77,9 +80,9 @@ class Timed:
         places = map(self.net.net.places.__getitem__, self.ratio.circuit)
         modes = {place.mode: place.label for place in places}
         if "tray" in modes:
-            return OUTFEED
+            return self.OUTFEED
         if "magazine" in modes:
-            return f"{FEEDER} {modes['magazine']}"
+            return f"{self.FEEDER} {modes['magazine']}"
         return self.timing.factory.robots[self.busiest[0]].name
 
     @cached_property
@@ -91,10 +94,14 @@ class Timed:
     def departures(self, units: int) -> list[float]:
         """When each of so many units is dropped off at the earliest, from the initial marking with
         robots at their B ends [s]."""
-        factory = self.timing.factory
-        periods, ends = -(-units // factory.period), [o.end for o in factory.dropoffs]
-        dates = earliest_firings(self.net, self.seconds, periods, self.timing.first, self.ready)
-        return [float(date) for date in dates[:, ends].ravel()[:units]]
+        ends = [o.end for o in self.timing.factory.dropoffs]
+        return [float(date) for date in self.firings(units)[:, ends].ravel()[:units]]
+
+    def firings(self, units: int) -> Array:
+        """(cycles, T): the earliest dates [s] of the firings of each transition, from the initial
+        marking, for at least `units` products."""
+        cycles, first = -(-units // self.timing.factory.period), self.timing.first
+        return earliest_firings(self.net, self.seconds, cycles, first, self.ready)
 
     @property
     def cycle(self) -> CycleTime:
@@ -102,7 +109,7 @@ class Timed:
         compiled = len(self.timing.factory.net.threaded.places)
         taken = {way: self.seconds[place] for way, place in self.ways.items()}
         gears = cycle_time(self.timing.factory, self.seconds[:compiled], taken)
-        if gears.seconds >= self.pace * (1 - SAME):
+        if gears.seconds >= self.pace * (1 - self.SAME):
             return gears
         return CycleTime(self.pace, self.bottleneck)
 
