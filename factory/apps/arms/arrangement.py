@@ -18,10 +18,10 @@ from factory.apps.arms.crew import RAILS
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal, wrist
 from factory.apps.arms.reach import Ring, ring_of
-from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.support.arrays import Array
 from factory.support.boxes import Box, Point2, hull
+from factory.support.rotations import about_vertical
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""
@@ -248,7 +248,7 @@ class Arrangement(Handling):
         angles, taken = [0.0, 0.0], [*map(self._span, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
-            solid = presented(self.product.solids[label])
+            solid = self.product.solids[label].presented()
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
             room = (self.near - beside - wide) / radius

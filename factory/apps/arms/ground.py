@@ -49,11 +49,10 @@ class CellGround(Ground):
     def lay_out(self, factory: Factory, product: Product, settings: Settings, *_: Any) -> Layout:
         """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
         from factory.apps.arms.laying import laid_out
-        from factory.floor.geometry.fused_bodies import repeated
         from factory.floor.mating.mating import judged
 
         assert self.model is not None
-        factory, product = from_one_side(judged(factory, product)), repeated(product, factory)
+        factory, product = from_one_side(judged(factory, product)), product.repeated(factory)
         rails = dict[int, Layout]()
         for label, project in self.rails.items():
             carrier = factory.by_label[label].carrier

@@ -28,9 +28,9 @@ from factory.apps.arms.reach import diagnose_reach
 from factory.apps.arms.rises import Rise, StraightEnd
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
-from factory.floor.geometry.turning import about_vertical
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
+from factory.support.rotations import about_vertical
 
 YAWS = 8
 """Number of angles at which a part may be held."""

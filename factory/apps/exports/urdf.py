@@ -19,10 +19,9 @@ import numpy as np
 from factory.api import names, physical_model
 from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
-from factory.floor.geometry.turning import upright
 from factory.support.arrays import Array
 from factory.support.meshes.triangles import convex_hull, stl
-from factory.support.rotations import rotation
+from factory.support.rotations import rotation, upright
 from factory.support.xml_writer import add, exact, numbers
 
 if TYPE_CHECKING:

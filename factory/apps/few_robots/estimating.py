@@ -15,7 +15,6 @@ from factory.apps.few_robots.folding import Line
 from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_forms
 from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
-from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.layout.hands.misses import NoGrip
 from factory.support.allowance import Allowance
 from factory.support.boxes import Box
@@ -239,7 +238,7 @@ def _task(project: Project) -> FormsTask:
 
 
 def _boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    return payload_boxes(factory, repeated(product, factory))
+    return payload_boxes(factory, product.repeated(factory))
 
 
 def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:

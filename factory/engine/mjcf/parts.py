@@ -12,12 +12,12 @@ from factory.engine.mjcf.names import part, piece
 from factory.engine.mjcf.names import solid as solid_name
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside
 from factory.floor.geometry.solids import Product, Solid
-from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
 from factory.support.boxes import Point2
+from factory.support.rotations import upright
 from factory.support.xml_writer import add, exact, numbers
 
 PARKED = -0.6
@@ -43,7 +43,7 @@ def place_in(
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
     operation = layout.factory.by_label[label]
-    centre = presented(layout.product.solids[label]).centre
+    centre = layout.product.solids[label].presented().centre
     elevation = layout.visits[operation.index, operation.carrier].elevation
     return place_in(layout.product, centre, layout.meeting(operation), elevation)
 

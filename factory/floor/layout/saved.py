@@ -7,7 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.embedding import certified
 from factory.floor.layout.guidepath import Guidepath
@@ -92,7 +91,7 @@ class LayoutTable:
         self._check(factory)
         laid = Layout(
             factory,
-            solids := repeated(product, factory),
+            solids := product.repeated(factory),
             self.clearance,
             self.guidepaths,
             self._visits(factory),
