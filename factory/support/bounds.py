@@ -53,9 +53,12 @@ LENGTHS = ("m", "cm", "mm", "in", "ldu")
 
 
 def check_values(values: Mapping[str, object]) -> None:
-    """Check values by their names in BOUNDS; None is always valid. Raises InputError (Usage) with
-    every fault."""
-    faults = [fault for name, value in values.items() for fault in _faults(name, value)]
+    """Check values by their names: a world is one of WORLDS, others are within BOUNDS, or None.
+    Raises InputError (Usage) with every fault."""
+    if "world" in values:
+        check_choice("world", values["world"], WORLDS)
+    numbers = {name: value for name, value in values.items() if name != "world"}
+    faults = [fault for name, value in numbers.items() for fault in _faults(name, value)]
     if faults:
         raise InputError(faults)
 

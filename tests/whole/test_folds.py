@@ -23,7 +23,7 @@ from factory.apps.few_robots.folding import (
     lines_of_labels,
 )
 from factory.apps.runs.start import legal_marking
-from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.bounds import _Bound
 from factory.floor.layout.durations import Pace
@@ -268,16 +268,16 @@ def test_a_bottleneck_of_two_robots() -> None:
     """From sub1 to sub3 with r1, and from there with r2: longer than the gear of either."""
     factory = three_robots()
     delays = {"part1": 1.0, "part2": 5.0, "part3": 4.0, "sub1": 2.0, "sub2": 7.0, "sub3": 2.0}
-    assert cycle_time(factory, delays) == CycleTime(16.0, "r1")
-    assert cycle_time(factory, {**delays, "part2": 14.0}) == CycleTime(25.0, "r2")
-    assert cycle_time(factory, {}).seconds == 0.0
+    assert CycleTime.of(factory, delays) == CycleTime(16.0, "r1")
+    assert CycleTime.of(factory, {**delays, "part2": 14.0}) == CycleTime(25.0, "r2")
+    assert CycleTime.of(factory, {}).seconds == 0.0
     ways = {(2, factory.by_label["sub2"].index): 30.0}
-    assert cycle_time(factory, delays, ways).bottleneck == "r3"
+    assert CycleTime.of(factory, delays, ways).bottleneck == "r3"
 
 
 def test_a_dead_train_has_no_cycle_time() -> None:
     with pytest.raises(ValueError, match="live"):
-        cycle_time(_dead(), {})
+        CycleTime.of(_dead(), {})
 
 
 @pytest.mark.parametrize(

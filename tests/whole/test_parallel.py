@@ -13,7 +13,7 @@ from factory.apps.few_robots.sharing import with_branches
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.layout.bounds import cycle_time_bound
 from factory.floor.layout.durations import Pace
 from factory.floor.robots.catalogue import load_catalogue
@@ -87,7 +87,7 @@ def test_theorem_4(k: int) -> None:
     """The cycle time is the greater of that of the rest and that of the branch, divided by k."""
     factory = replicated(k)
     rest, branch = 3.0, 1.0 + 1.0 + 11.0 + 1.0
-    found = cycle_time(factory, delays(factory))
+    found = CycleTime.of(factory, delays(factory))
     assert found.seconds == pytest.approx(max(rest, branch / k))
     seconds = [*delays(factory), *[0.0] * (len(factory.net.threaded.places))]
     seconds = seconds[: len(factory.net.threaded.places)]

@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits
-from factory.engine.timing.timed import Timed, timed
+from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Change
 from factory.support.arrays import Array
 
@@ -100,7 +100,7 @@ def timed_net(timing: Timing, change: Change | None = None, wip: int | None = No
     Raises InputError (BadValue) where `wip` is below 1.
     """
     change = change or Change()
-    made, factory = timed(timing, change, wip), timing.factory
+    made, factory = Timed.of(timing, change, wip), timing.factory
     places, tokens, seconds = [*made.net.net.places], [*made.net.tokens], [*made.seconds]
     named = _gears(timing, seconds, tokens, made.ways)
     for number in _alone(timing, change):
@@ -283,7 +283,7 @@ def steady_units(timing: Timing) -> int:
 
     Robots before the bottleneck fill first; until then products come at the pace of other robots.
     """
-    net = timed(timing)
+    net = Timed.of(timing)
     return reached(np.array(net.departures(MOST)), net.pace, timing.factory.period)
 
 

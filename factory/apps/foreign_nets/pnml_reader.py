@@ -17,7 +17,7 @@ from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.nets.composition import compose
+from factory.theory.nets.composition import Composition
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
 from factory.theory.problem.ids import PlaceId, TransitionId
 
@@ -121,7 +121,7 @@ class _Reader:
         try:
             return GearNet(ThreadedNet(net.net, redistribution), gears, initial, slots)
         except ValueError as error:
-            if not compose(loose).defects:
+            if not Composition.of(loose).defects:
                 hint = "name each slot before and after it once, or leave the notes out"
                 self.fault(elements[0], str(error), hint)
                 self.stop()

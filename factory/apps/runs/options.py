@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.api import Diagnostic, InputError, WorldName
-from factory.support.bounds import WORLDS, check_choice, check_values
+from factory.support.bounds import check_values
 from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
@@ -99,8 +99,7 @@ class RunOptions:
     strict: bool = False
 
     def __post_init__(self) -> None:
-        check_choice("world", self.world, WORLDS)
-        names = ("units", "seed", "jitter", "wip", "max_time", "spares", "swap")
+        names = ("world", "units", "seed", "jitter", "wip", "max_time", "spares", "swap")
         check_values({name: getattr(self, name) for name in names})
 
     @property

@@ -23,8 +23,7 @@ from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
 from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.on_demand import cycle_of
-from factory.engine.timing.timed import duration
-from factory.engine.timing.timed import timed as timed_net
+from factory.engine.timing.timed import Timed, duration
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.resting import on_demand, start_at_rest
@@ -324,7 +323,7 @@ class Simulation:
             return False
         if len(left) > SETTLED or abs(measured / pace - 1) < AGREES:
             return False
-        net = timed_net(self.timing, wip=wip)
+        net = Timed.of(self.timing, wip=wip)
         foretold = mean_interval(net.departures(len(left)), period)
         return foretold is not None and abs(foretold / pace - 1) >= AGREES
 

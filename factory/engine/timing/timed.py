@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
-from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.pool import with_wip
 from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
@@ -108,50 +108,50 @@ class Timed:
         """The cycle time and its bottleneck: a robot where its gear alone allows no less."""
         compiled = len(self.timing.factory.net.threaded.places)
         taken = {way: self.seconds[place] for way, place in self.ways.items()}
-        gears = cycle_time(self.timing.factory, self.seconds[:compiled], taken)
+        gears = CycleTime.of(self.timing.factory, self.seconds[:compiled], taken)
         if gears.seconds >= self.pace * (1 - self.SAME):
             return gears
         return CycleTime(self.pace, self.bottleneck)
 
+    @classmethod
+    def of(cls, timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
+        """The timed net of a layout with a change of its robots and a bound on copies of each part.
 
-def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
-    """The timed net of a layout with a change of its robots and a bound on copies of each part.
+        In a run a transition fires a tick after those that it waits for. The net has this tick in
+        each operation, so its ends come a tick late: what else follows an end takes a tick less.
 
-    In a run a transition fires a tick after those that it waits for. The net has this tick in each
-    operation, so its ends come a tick late: what else follows an end takes a tick less.
-
-    Raises InputError (BadValue) where `wip` is below 1.
-    """
-    factory, coordinated = timing.factory, timing.coordinated
-    net, count = _copied(timing, change), len(factory.net.threaded.places)
-    delays = timing.changed(change)
-    seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
-    owners: dict[int, tuple[int, ...]] = dict(enumerate(factory.net.slots))
-    dates = timing.passes(change)
-    dates |= {
-        past: max(0.0, date - timing.tick) for past, date in dates.items() if is_end(past.after)
-    }
-    for past, (place, before) in coordinated.passes.items():
-        seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
-        owners[place] = (factory.robot_of(past.axis),)
-    for number, served in coordinated.served.items():
-        up, seconds[served.down] = timing.strokes[number]
-        seconds[served.up] = up - timing.tick
-    for away in coordinated.away.values():
-        seconds[away] = timing.outfeed - timing.tick
-    bounds: tuple[int, ...] = ()
-    if wip is not None:
-        bounded = with_wip(factory, min(wip, len(factory.robots)))
-        more, tokens = bounded.net.places[count:], bounded.tokens[count:]
-        bounds = tuple(range(len(seconds), len(seconds) + len(more)))
-        places = replace(net.net, places=(*net.net.places, *more))
-        net = MarkedNet(places, (*net.tokens, *tokens))
-        seconds += [0.0] * len(more)
-    went = ways_apart(factory.net, seconds, timing.ways(change))
-    ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
-    owners |= {way: (robot,) for (robot, _), way in ways.items()}
-    net = with_ways(net, factory.net, went)
-    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
+        Raises InputError (BadValue) where `wip` is below 1.
+        """
+        factory, coordinated = timing.factory, timing.coordinated
+        net, count = _copied(timing, change), len(factory.net.threaded.places)
+        delays = timing.changed(change)
+        seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
+        owners: dict[int, tuple[int, ...]] = dict(enumerate(factory.net.slots))
+        dates = timing.passes(change)
+        dates |= {
+            past: max(0.0, date - timing.tick) for past, date in dates.items() if is_end(past.after)
+        }
+        for past, (place, before) in coordinated.passes.items():
+            seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
+            owners[place] = (factory.robot_of(past.axis),)
+        for number, served in coordinated.served.items():
+            up, seconds[served.down] = timing.strokes[number]
+            seconds[served.up] = up - timing.tick
+        for away in coordinated.away.values():
+            seconds[away] = timing.outfeed - timing.tick
+        bounds: tuple[int, ...] = ()
+        if wip is not None:
+            bounded = with_wip(factory, min(wip, len(factory.robots)))
+            more, tokens = bounded.net.places[count:], bounded.tokens[count:]
+            bounds = tuple(range(len(seconds), len(seconds) + len(more)))
+            places = replace(net.net, places=(*net.net.places, *more))
+            net = MarkedNet(places, (*net.tokens, *tokens))
+            seconds += [0.0] * len(more)
+        went = ways_apart(factory.net, seconds, timing.ways(change))
+        ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
+        owners |= {way: (robot,) for (robot, _), way in ways.items()}
+        net = with_ways(net, factory.net, went)
+        return cls(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
 
 
 def _copied(timing: Timing, change: Change) -> MarkedNet:
@@ -173,7 +173,7 @@ def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, tuple[float, ..
         settings: the settings of the run.
     """
     timing = Timing(layout, settings)
-    return timed(timing).cycle, timing.delays
+    return Timed.of(timing).cycle, timing.delays
 
 
 def duration(timing: Timing, cycle: float, units: int) -> float:
