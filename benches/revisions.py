@@ -17,12 +17,13 @@ from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pins import StayingRobot
 from factory.apps.revise.revision import revised
 from factory.engine.timing.timed import pace
-from factory.pipeline import all_templates, read
+from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import read
 from factory.support.errors import RunError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.pag import PAG, Assembly, Parameter
-from factory.theory.problem.robot_types import load_catalogue
 
 KINDS = ("change", "add", "drop", "swap", "tool", "rename")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from factory.engine.mjcf import names as names
+    from factory.engine.mjcf.loading import load as load
     from factory.engine.mjcf.model import Model as Model
     from factory.engine.mjcf.parts import HIDDEN as HIDDEN
     from factory.engine.mjcf.replica import Geoms as Geoms
@@ -39,50 +40,49 @@ if TYPE_CHECKING:
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
     from factory.floor.geometry.meshes import Mesh as Mesh
+    from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
-    from factory.floor.geometry.solids import rotation as rotation
+    from factory.floor.layout.branches import carriers as carriers
     from factory.floor.layout.certificate import Certificate as Certificate
     from factory.floor.layout.clearance import certify as certify
+    from factory.floor.layout.dimensions import Clearance as Clearance
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.embedding import certified as certified
+    from factory.floor.layout.exclusions import coordinated as coordinated
     from factory.floor.layout.guidepath import Guidepath as Guidepath
-    from factory.floor.layout.guidepath import Point2 as Point2
     from factory.floor.layout.hands.choosing import Hands as Hands
     from factory.floor.layout.hands.hand import Hand as Hand
     from factory.floor.layout.layout import Layout as Layout
     from factory.floor.layout.request import Ground as Ground
+    from factory.floor.layout.saved import LayoutTable as LayoutTable
     from factory.floor.layout.shapes import payload_boxes as payload_boxes
+    from factory.floor.layout.starting import start_positions as start_positions
+    from factory.floor.layout.sweeps import regions as regions
+    from factory.floor.mating.finder import Finder as Finder
+    from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
-    from factory.support.arrays import Array as Array
-    from factory.support.arrays import Index as Index
-    from factory.support.arrays import Indices as Indices
-    from factory.support.arrays import Truth as Truth
-    from factory.support.bounds import Allowance as Allowance
-    from factory.support.collector import collector_paused as collector_paused
-    from factory.support.engine import mujoco as mujoco
+    from factory.support.bounds import WorldName as WorldName
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
-    from factory.support.errors import Position as Position
     from factory.support.errors import RunError as RunError
-    from factory.support.errors import did_you_mean as did_you_mean
-    from factory.support.errors import usage_error as usage_error
-    from factory.support.files import read_bytes as read_bytes
-    from factory.support.files import write_all as write_all
     from factory.support.settings import Settings as Settings
-    from factory.support.tables import misfit as misfit
-    from factory.support.tables import table_of as table_of
-    from factory.support.tables import value_of as value_of
-    from factory.support.version import optional as optional
+    from factory.theory.compiler.expanding import Node as Node
+    from factory.theory.compiler.expanding import expand as expand
     from factory.theory.control.laws import Setting as Setting
     from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
     from factory.theory.control.mode import Mode as Mode
     from factory.theory.lang.pag_reader import load_pag as load_pag
+    from factory.theory.lang.pag_reader import read_pag as read_pag
     from factory.theory.lang.source import read_text as read_text
+    from factory.theory.lang.template_reader import all_templates as all_templates
+    from factory.theory.lang.template_reader import read_template as read_template
     from factory.theory.lang.writer import write_pag as write_pag
+    from factory.theory.lang.writer import write_template as write_template
+    from factory.theory.nets.gears import Gear as Gear
     from factory.theory.nets.gears import GearNet as GearNet
     from factory.theory.nets.marked import NONE as NONE
     from factory.theory.nets.marked import MarkedNet as MarkedNet
@@ -96,69 +96,73 @@ if TYPE_CHECKING:
     from factory.theory.nets.undone import Undone as Undone
     from factory.theory.nets.verdict import Verdict as Verdict
     from factory.theory.nets.verdict import listing as listing
+    from factory.theory.nets.verify import proved as proved
     from factory.theory.nets.verify import verify as verify
     from factory.theory.plant.demand import Demand as Demand
     from factory.theory.plant.factory import Factory as Factory
     from factory.theory.plant.operation import Operation as Operation
     from factory.theory.plant.robot import Robot as Robot
-    from factory.theory.problem.ids import PlaceId as PlaceId
-    from factory.theory.problem.ids import TransitionId as TransitionId
     from factory.theory.problem.pag import NOPART as NOPART
     from factory.theory.problem.pag import PAG as PAG
     from factory.theory.problem.pag import Assembly as Assembly
+    from factory.theory.problem.pag import Parameter as Parameter
+    from factory.theory.problem.pag import Value as Value
     from factory.theory.problem.plan import Plan as Plan
     from factory.theory.problem.robot_types import Catalogue as Catalogue
-    from factory.theory.problem.robot_types import load_catalogue as load_catalogue
     from factory.theory.problem.template import Template as Template
 
 HOMES = {
-    "support.errors": "Diagnostic FactoryError InputError Position RunError "
-    "did_you_mean usage_error",
+    "support.errors": "Diagnostic FactoryError InputError RunError",
     "support.settings": "Settings",
-    "support.arrays": "Array Index Indices Truth",
-    "support.bounds": "Allowance",
-    "support.collector": "collector_paused",
-    "support.engine": "mujoco",
-    "support.files": "read_bytes write_all",
-    "support.tables": "misfit table_of value_of",
-    "support.version": "optional",
+    "support.bounds": "WorldName",
     "support.apps": "App",
-    "theory.problem.ids": "PlaceId TransitionId",
-    "theory.problem.pag": "NOPART PAG Assembly",
+    "theory.problem.pag": "Assembly NOPART PAG Parameter Value",
     "theory.problem.plan": "Plan",
-    "theory.problem.robot_types": "Catalogue load_catalogue",
+    "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
-    "theory.lang.pag_reader": "load_pag",
+    "theory.lang.pag_reader": "load_pag read_pag",
     "theory.lang.source": "read_text",
-    "theory.lang.writer": "write_pag",
-    "theory.nets.gears": "GearNet",
-    "theory.nets.marked": "NONE MarkedNet marked token_free",
+    "theory.lang.writer": "write_pag write_template",
+    "theory.lang.template_reader": "all_templates read_template",
+    "theory.nets.gears": "Gear GearNet",
+    "theory.nets.marked": "MarkedNet NONE marked token_free",
     "theory.nets.petri": "Marking PetriNet Place Transition",
     "theory.nets.undone": "Entry Undone",
     "theory.nets.verdict": "Verdict listing",
-    "theory.nets.verify": "verify",
+    "theory.nets.verify": "proved verify",
     "theory.control.laws": "Setting navigation",
     "theory.control.mode": "Limits Mode",
     "theory.plant.demand": "Demand",
     "theory.plant.factory": "Factory",
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
+    "theory.compiler.expanding": "Node expand",
     "floor.geometry.meshes": "Mesh",
-    "floor.geometry.solids": "Product Solid rotation",
+    "floor.geometry.solids": "Product Solid",
+    "floor.geometry.product": "product_geometry",
+    "floor.robots.catalogue": "load_catalogue",
+    "floor.mating.finder": "Finder",
     "floor.layout.certificate": "Certificate",
     "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",
     "floor.layout.embedding": "certified",
-    "floor.layout.guidepath": "Guidepath Point2",
+    "floor.layout.guidepath": "Guidepath",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
     "floor.layout.layout": "Layout",
     "floor.layout.request": "Ground",
     "floor.layout.shapes": "payload_boxes",
+    "floor.layout.dimensions": "Clearance",
+    "floor.layout.exclusions": "coordinated",
+    "floor.layout.saved": "LayoutTable",
+    "floor.layout.starting": "start_positions",
+    "floor.layout.sweeps": "regions",
+    "floor.layout.branches": "carriers",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",
     "engine.mjcf.replica": "Geoms Replica",
+    "engine.mjcf.loading": "load",
     "engine.timing.timed": "pace",
     "engine.timing.timing": "Timing",
     "engine.record.ending": "CutOff",
@@ -173,9 +177,9 @@ HOMES = {
     "engine.simulation.run": "Run steady_from",
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
+    "pipeline": "Project",
     "film.picture": "Picture",
     "film.shot": "Shot",
-    "pipeline": "Project",
 }
 """The names by the modules that define them, in the order of the house."""
 

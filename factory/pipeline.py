@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from factory.floor.layout.request import Ground, hands_of
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.support.tables import MISFITS, misfit
@@ -21,13 +22,12 @@ from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.expanding import expand
 from factory.theory.compiler.turning import check_shapes, placed
 from factory.theory.lang.pag_reader import load_pag
-from factory.theory.lang.template_reader import all_templates as all_templates
-from factory.theory.lang.template_reader import is_shipped
+from factory.theory.lang.template_reader import all_templates, is_shipped
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 from factory.theory.problem.template import Template
 
 if TYPE_CHECKING:

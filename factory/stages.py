@@ -46,8 +46,9 @@ def project_of(
     Raises InputError, of code Usage for what is no product."""
     from factory.apps.log.plan_file import read_plan
     from factory.floor.layout.layout import Layout
-    from factory.pipeline import Project, all_templates, read
+    from factory.pipeline import Project, read
     from factory.support.files import is_plan
+    from factory.theory.lang.template_reader import all_templates
     from factory.theory.plant.factory import Factory
     from factory.theory.problem.pag import PAG
 

@@ -242,10 +242,11 @@ def plan(
     from factory.apps.planning.plan import CannotAssemble, PlanOptions
     from factory.apps.planning.plan import plan as planned_for
     from factory.apps.planning.source import SourceOptions, read_source
-    from factory.pipeline import all_templates, read
+    from factory.pipeline import read
     from factory.support.bounds import AIMS, LENGTHS, UPS, check_choice, check_values
     from factory.support.errors import InputError
     from factory.theory.lang.overlaps import overlaps_in
+    from factory.theory.lang.template_reader import all_templates
 
     check_values({"seconds": seconds})
     check_choice("aim", aim, AIMS)

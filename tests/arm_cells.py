@@ -8,8 +8,9 @@ from factory.api import Diagnostic, InputError, RunError
 from factory.apps.arms.cell import CellChains
 from factory.apps.arms.ground import with_arm
 from factory.floor.layout.layout import Layout
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 
 SMALL = """root = box;
 box = mate ( filled, lid );

@@ -8,13 +8,13 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import tool_line
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.legs import Clearance
 from factory.apps.arms.model import ArmModel, arm_model
 from factory.apps.arms.slowness import enforce_limits
+from factory.support.arrays import Array, Index, Truth
 
 PACE = WayLimits()
 

@@ -14,18 +14,20 @@ from factory.floor.layout.durations import Pace
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
 from factory.floor.mating.mating import judged
-from factory.pipeline import Project, all_templates
+from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import Project
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.folding import sides_of
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import marked
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.plan import Plan
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
 from tests.token_game import dates
 

@@ -21,6 +21,9 @@ from tests.paths import ROOT
 MOST = 100
 """How many names the interface may have."""
 
+MOST_TOOLS = 128
+"""How many tools `support` may have."""
+
 ENTRY = re.compile(r"^ +(\w+(?:, \w+)*):", re.M)
 """A line of a docstring that explains names."""
 
@@ -76,7 +79,9 @@ def documented(module: Module, name: str) -> tuple[str, str, list[str]]:
             case ast.FunctionDef(name=there) if there == name:
                 every = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
                 return "Args", ast.get_docstring(node) or "", [one.arg for one in every]
-            case ast.Assign(targets=[ast.Name(id=there)]) if there == name:
+            case ast.Assign(targets=[target]) if name in {
+                one.id for one in ast.walk(target) if isinstance(one, ast.Name)
+            }:
                 text = after.value if isinstance(after, ast.Expr) else None
                 return "", text.value if isinstance(text, ast.Constant) else "", []
     return "", ast.get_docstring(module.tree) or "", []
@@ -153,7 +158,7 @@ FLOORS = (
     ("theory.lang", "theory.nets", "theory.control"),
     ("theory.plant",),
     ("theory.compiler",),
-    ("floor.geometry",),
+    ("floor.geometry", "floor.robots"),
     ("floor.mating",),
     ("floor.layout",),
     ("floor.modes",),
@@ -193,8 +198,7 @@ ENTRANCES = (
 the functions that a user calls, how values are shown."""
 
 ENGINE_ROOMS = (
-    *("support", "engine/mjcf", "engine/record", "engine/simulation/mujoco", "film", "api"),
-    "apps",
+    *("support", "engine/mjcf", "engine/record", "engine/simulation/mujoco", "film", "apps"),
 )
 """Rooms, or parts of rooms, that may import the engine."""
 
@@ -364,10 +368,43 @@ def upward_imports(house: House) -> Iterator[str]:
                 yield f"{module.name} imports {other or 'factory'}"
 
 
+def tools(house: House) -> dict[str, list[str]]:
+    """The tools of `support`, which every layer and every app may use: what `__all__` of its
+    modules lists."""
+    return {
+        name: ast.literal_eval(node.value or ast.List([]))
+        for name, module in house.modules.items()
+        if module.room == "support"
+        for node in module.tree.body
+        if isinstance(node, ast.Assign | ast.AnnAssign)
+        and ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target)
+        == "__all__"
+    }
+
+
+def unfit_tools(house: House) -> Iterator[str]:
+    """Tools past the most that there may be, tools without a docstring or that no app uses, and
+    imports of their modules from others: a tool knows nothing of factories."""
+    table = tools(house)
+    apps = [module for module in house.modules.values() if module.room.startswith("apps.")]
+    used = {name for module in apps for name in house.names(module)}
+    if (count := sum(map(len, table.values()))) > MOST_TOOLS:
+        yield f"support: {count} tools; at most {MOST_TOOLS}"
+    for home, names in table.items():
+        module = house.modules[home]
+        yield from (f"{home} imports {n}" for n in sorted(house.imports(module) - {*table}))
+        for name in names:
+            if not documented(module, name)[1]:
+                yield f"{home}.{name}: no docstring"
+            if f"{home}.{name}" not in used:
+                yield f"{home}.{name}: no app uses it"
+
+
 def reach_ins(house: House) -> Iterator[str]:
-    """Imports of an app from the core past `factory.api` that `reach_ins.toml` does not list, and
-    lines of that list that nothing needs. Its command line stands with `commands`, which use all
-    that they print and call."""
+    """Imports of an app from the core past `factory.api` and the tools of `support` that
+    `reach_ins.toml` does not list, and lines of that list that nothing needs. Its command line
+    stands with `commands`, which use all that they print and call."""
+    free = {f"{home}.{name}" for home, names in tools(house).items() for name in names}
     listed = {
         (app, f"{module}.{name}")
         for app, modules in house.reach_ins.items()
@@ -379,7 +416,7 @@ def reach_ins(house: House) -> Iterator[str]:
         for module in house.modules.values()
         if re.fullmatch(r"apps\.\w+", module.room)
         for name in house.names(module)
-        if not name.startswith(("api.", "apps."))
+        if not name.startswith(("api.", "apps.")) and name not in free
     }
     yield from (f"the app {app} reaches {name}" for app, name in sorted(there - listed))
     yield from (f"the app {app} no longer reaches {name}" for app, name in sorted(listed - there))
@@ -408,8 +445,7 @@ def engine_imports(house: House) -> Iterator[str]:
                 else []
             )
         }
-        doors = {"support.engine", "api.mujoco"} & (house.imports(module) | house.names(module))
-        reaches = "mujoco" in direct or bool(doors)
+        reaches = "mujoco" in direct or "support.engine" in house.imports(module)
         if reaches and not module.within(ENGINE_ROOMS):
             yield f"{module.name} imports the engine"
         if "mujoco" in direct and module.name != "support.engine":

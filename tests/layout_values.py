@@ -11,11 +11,12 @@ from functools import cache
 from types import MappingProxyType
 
 from factory.floor.geometry.product import product_geometry
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.embedding import lay_out
-from factory.floor.layout.guidepath import moved as displaced
 from factory.floor.layout.hands.hand import Point3
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import visits_of
+from factory.support.boxes import moved as displaced
 from factory.theory.problem.pag import PAG, Assembly, Parameter, Value
 from tests.pag_values import SHAPES, factory_of, paper, random_pag
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from factory.floor.layout.layout import Layout
-from factory.pipeline import Project, all_templates
+from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import Project
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang import read_pag, read_template
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 
 PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
 sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""

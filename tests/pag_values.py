@@ -7,11 +7,12 @@ from functools import cache
 
 from hypothesis import strategies as st
 
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import Position
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG, Assembly
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 from factory.theory.problem.template import Law, Point, Template
 
 _DOT = Template(

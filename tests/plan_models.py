@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.pipeline import all_templates
+from factory.theory.lang.template_reader import all_templates
 
 MM = 1e-3
 

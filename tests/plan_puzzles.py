@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.pipeline import all_templates
+from factory.theory.lang.template_reader import all_templates
 
 Box = tuple[tuple[float, float, float], tuple[float, float, float]]
 Body = Box | Sequence[tuple[float, float, float]]

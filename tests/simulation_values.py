@@ -15,9 +15,10 @@ from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
 from factory.support.settings import Settings
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from tests.examples import without_hands
 from tests.paths import ROOT
 

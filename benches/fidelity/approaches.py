@@ -9,7 +9,7 @@ from benches.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layo
 from benches.tables import table
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER, STRICT
+from factory.floor.mating.findings import Level
 from factory.floor.mating.paths import CLEAR, TOLERANCE
 from factory.pipeline import read
 
@@ -34,9 +34,9 @@ def judged(name: str) -> dict[str, Any]:
     return {
         "product": name,
         "operations": len(found.all),
-        "left_out": found.count(LEFT_OUT),
-        "no_deeper": found.count(NO_DEEPER),
-        "strict": found.count(STRICT),
+        "left_out": found.count(Level.LEFT_OUT),
+        "no_deeper": found.count(Level.NO_DEEPER),
+        "strict": found.count(Level.STRICT),
         **{kind: len(found.of_kind(kind)) for kind in ("slide", "lower", "blocked")},
         "seconds": round(seconds, 2),
         "excluded": len(run.physics.excluded),

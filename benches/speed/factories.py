@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import cast
 
 from benches.fidelity.products import EXAMPLES
-from factory.engine.record.verdict import RunVerdict, judged, kept_figures
+from factory.engine.record.verdict import RunVerdict
 from factory.engine.simulation.mujoco.courses import Course
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import entries_of
@@ -194,7 +194,7 @@ def judge(simulation: Simulation) -> None:
     supervisor, factory = simulation.supervisor, simulation.layout.factory
     entries = entries_of(supervisor.events)
     refines = replay(factory.net, entries, simulation.start, factory.joins).refines
-    require(judged(None, refines, kept_figures(world.figures()), None))
+    require(RunVerdict.of(None, refines, RunVerdict.kept_figures(world.figures()), None))
 
 
 def require(verdict: RunVerdict) -> None:
@@ -208,4 +208,4 @@ def _step(simulation: Simulation) -> None:
     simulation.supervisor.step(MOST)
     trouble = simulation.ends()
     if trouble is not None:
-        require(judged(trouble, True, None, None))
+        require(RunVerdict.of(trouble, True, None, None))

@@ -21,9 +21,9 @@ from factory.film.camerawork import Camerawork, Moment, Take
 from factory.film.history import History
 from factory.film.picture import Picture
 from factory.film.reel import Reel
-from factory.film.video import FPS
 from factory.support import gl
 from factory.support.engine import mujoco
+from factory.support.pictures.video import FPS
 
 ROBOTS = (6, 40)
 """The paper's example, and a balanced tree."""

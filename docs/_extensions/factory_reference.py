@@ -21,13 +21,13 @@ from factory import api
 from factory.apps.exports import exporters
 from factory.commands import cli
 from factory.commands import commands as every_command
-from factory.pipeline import all_templates
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.explanations import codes, explain
 from factory.support.resources import mjcf_folder
-from factory.support.settings import RANGES, Settings
+from factory.support.settings import Settings
 from factory.support.user_defaults import OPTIONS
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.values import WRITTEN
-from factory.theory.problem.robot_types import load_catalogue
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -86,7 +86,7 @@ def settings() -> str:
     built_in = Settings()
     rows = [
         (f"`{name}`", built(getattr(built_in, name)), f"{low:g} to {high:g}", variable(name))
-        for name, (low, high) in RANGES.items()
+        for name, (low, high) in Settings.RANGES.items()
     ]
     shared = [(f"`{k}`", f"`{example!r}`", variable(k)) for k, example in OPTIONS.items()]
     return "\n\n".join(

@@ -119,7 +119,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     from factory.floor.layout.hands.bores import bores
     from factory.floor.layout.tiles import fill_of, tiles_of
     from factory.support.settings import AUTO
-    from factory.theory.lang.source import counted
+    from factory.support.texts import counted
 
     layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)

@@ -193,7 +193,7 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]) -> None:
     """Print the gears, the counts and the verdict."""
-    from factory.theory.lang.source import counted
+    from factory.support.texts import counted
 
     counts, gears = checked.counts(), checked.verdict.gears
     shown = checked.gears(None if verbose else SHOWN)

@@ -17,7 +17,6 @@ from factory.theory.nets.petri import Place
 from factory.theory.nets.verdict import Verdict
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
-from factory.theory.problem.pag import most_allowed
 
 if TYPE_CHECKING:
     from factory.floor.geometry.solids import Product
@@ -96,12 +95,12 @@ class Checked:
         from factory.floor.geometry.overlapping import overlaps_of
 
         pag = self.factory.pag
-        allowed, insides = pag.allowed, pag.insides if pag.mix else ()
+        insides = pag.insides if pag.mix else ()
         rows = [
             {
                 "parts": [pair.one, pair.other],
                 "depth_mm": round(1e3 * pair.depth, 6),
-                "allowed_mm": round(1e3 * most_allowed(allowed, pair.one, pair.other), 6),
+                "allowed_mm": round(1e3 * pag.most_allowed(pair.one, pair.other), 6),
             }
             for pair in overlaps_of(self.product, *insides).pairs
         ]

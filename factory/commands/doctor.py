@@ -109,8 +109,8 @@ def _extra(name: str) -> Finding:
 
 def _assets() -> Finding:
     try:
-        from factory.pipeline import all_templates
-        from factory.theory.problem.robot_types import load_catalogue
+        from factory.floor.robots.catalogue import load_catalogue
+        from factory.theory.lang.template_reader import all_templates
 
         counts = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
         return Finding("assets", True, counts)

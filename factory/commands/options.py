@@ -47,9 +47,9 @@ def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
     from factory.apps.log import is_log, read_log
     from factory.apps.log.plan_file import read_plan
     from factory.apps.log.project_table import factory_of, project_of
-    from factory.pipeline import all_templates
     from factory.support.files import is_plan
     from factory.theory.lang import load_pag
+    from factory.theory.lang.template_reader import all_templates
 
     try:
         if file is None:
@@ -137,9 +137,11 @@ class Timestep(click.ParamType[float | str]):
     name = "number|auto"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        from factory.support.settings import is_auto
+        from factory.support.settings import Settings
 
-        return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
+        return (
+            value if Settings.is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
+        )
 
 
 class Branch(click.ParamType[tuple[str, int]]):

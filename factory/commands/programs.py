@@ -20,7 +20,7 @@ from factory.support.errors import did_you_mean, usage_error
 def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""
     from factory.apps.exports.program_text import write_program
-    from factory.theory.plant.programs import program_of
+    from factory.theory.plant.programs import Program
 
     factory = options.project(out.silent).factory
     names = [r.name for r in factory.robots]
@@ -28,7 +28,7 @@ def programs(options: ProjectOptions, out: OutputOptions, robot: str | None) -> 
         hint = did_you_mean(robot, names, "robots")
         raise usage_error(f"there is no robot '{robot}'", hint)
     chosen = [r for r in factory.robots if robot in (None, r.name)]
-    texts = {r.name: write_program(program_of(factory, r.index)) for r in chosen}
+    texts = {r.name: write_program(Program.of(factory, r.index)) for r in chosen}
     if out.as_json:
         emit({"programs": texts})
     else:

@@ -16,9 +16,9 @@ from factory.support.console import emit, say, table
 @OUTPUT
 def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
     """List the available operations and robot types."""
-    from factory.pipeline import all_templates
+    from factory.floor.robots.catalogue import load_catalogue
+    from factory.theory.lang.template_reader import all_templates
     from factory.theory.lang.writer import write_template
-    from factory.theory.problem.robot_types import load_catalogue
 
     operations, catalogue = all_templates(folders), load_catalogue()
     if out.as_json:

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Geoms, Replica
 from factory.engine.mjcf.weld_frames import WeldFrames, joints_of
-from factory.floor.geometry.sight import View
-from factory.floor.geometry.solids import rotation
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import View
+from factory.support.rotations import rotation
 
 FAINT = 0.16
 """Opacity of a geom that hides the action."""

@@ -17,19 +17,20 @@ from factory.film.drawn import drawn
 from factory.film.filament import Filament, draws
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
-from factory.film.ink import Pixels
 from factory.film.marks import Marks
 from factory.film.net_panel import NetPanel
 from factory.film.painter import Painter, Renderer
-from factory.film.picture import Area, PanelName, Picture, Size, shared
+from factory.film.picture import Area, PanelName, Picture, shared
 from factory.film.sheet import NAMES, OUTSIDE, Rows
 from factory.film.tour import Tour
-from factory.floor.geometry.sight import Framing
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.sight import Framing
+from factory.support.pictures.video import Size
 from factory.support.resource import Closing
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 
 When = float | Literal["end"]
 

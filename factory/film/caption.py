@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from factory.film.colours import AMBER, DEAD
 from factory.film.history import History
-from factory.film.ink import (
-    AMBER,
-    DEAD,
+from factory.support.pictures.ink import (
     FAINT,
     FLASH,
     INK,
@@ -19,7 +18,7 @@ from factory.film.ink import (
     fitted,
     width,
 )
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 from factory.theory.nets.verdict import listing
 
 BAR = 0.82

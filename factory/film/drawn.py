@@ -13,8 +13,8 @@ from factory.film.filament import settings
 from factory.film.look import CLASSIC_FLOOR, FILAMENT_FLOOR
 from factory.film.picture import Camera
 from factory.film.vantage import overview
-from factory.floor.geometry.sight import Framing
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import Framing
 
 SOUTH = -90.0
 """Azimuth from which a plan is read [degrees]."""

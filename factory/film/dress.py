@@ -16,7 +16,6 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, numbers
 from factory.engine.mjcf.replica import SHOWN, Geoms
 from factory.film import housings, outfits
 from factory.film.look import CLASSIC_FLOOR, PART, FloorPaint, Surface, paint
@@ -24,6 +23,7 @@ from factory.film.outfits import Half, Layer, Outfit
 from factory.film.skins import Skin
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.xml_writer import add, numbers
 
 LEAST = 4e-4
 """Half the side of the thinnest box that is dressed [m]."""

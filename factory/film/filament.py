@@ -21,15 +21,16 @@ from typing import Any
 import numpy as np
 
 from factory.engine.mjcf.replica import SHOWN, Replica
-from factory.film.ink import Pixels
 from factory.film.marks import THIN, Mark
-from factory.film.picture import RendererName, Size
+from factory.film.picture import RendererName
 from factory.film.studio import GOLDEN, SIZE, environment, moved, sun
-from factory.floor.geometry.sight import View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.gl import loads
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.sight import View
+from factory.support.pictures.video import Size
 from factory.support.resource import Closing
 
 AROUND, KEY = 9_500.0, 60_000.0

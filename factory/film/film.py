@@ -11,10 +11,10 @@ from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot, held
 from factory.film.camerawork import Camerawork, Moment, Take, When, past_the_end, pictureless
 from factory.film.history import TIE, History
-from factory.film.ink import Pixels
 from factory.film.picture import USUAL, Picture
 from factory.film.reel import Reel, save
-from factory.film.video import FPS, check_output
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.video import FPS, check_output
 from factory.theory.nets.undone import Undone
 
 if TYPE_CHECKING:

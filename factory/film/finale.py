@@ -12,12 +12,12 @@ from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.film.action import Snapshot, placed
 from factory.film.camerawork import Camerawork, Moment, Take
 from factory.film.caption import draw_title
-from factory.film.ink import Pixels
 from factory.film.picture import orbit
-from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
-from factory.theory.lang.source import counted
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.sight import Framing, View
+from factory.support.texts import counted
 
 LASTS = 2.0
 """How long a finished product is shown [s]."""

@@ -21,9 +21,9 @@ from factory.film.hero import clear_the_way, free_side
 from factory.film.junction import Handover, handover_of
 from factory.film.picture import HANDOVER, PART, Camera, from_above, orbit
 from factory.film.vantage import overview
-from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import Framing, View, fit, towards
 
 LAG = 0.25
 """Time in which the camera goes from one product to the next [s]."""

@@ -4,24 +4,11 @@ from __future__ import annotations
 
 from math import ceil
 
+from factory.film.colours import AMBER, DEAD, operation_colours, template_colours
 from factory.film.history import TIE, History, OperationProgress, Spell
-from factory.film.ink import (
-    AMBER,
-    DEAD,
-    FAINT,
-    FLASH,
-    LINE,
-    WHITE,
-    Ink,
-    Pixels,
-    fitted,
-    operation_colours,
-    pale,
-    template_colours,
-    width,
-)
 from factory.film.sheet import FOOT, PanelRow, PanelSheet, Rows
 from factory.support.arrays import Array
+from factory.support.pictures.ink import FAINT, FLASH, LINE, WHITE, Ink, Pixels, fitted, pale, width
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""

@@ -9,9 +9,9 @@ import shapely
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import SHOWN, Replica
 from factory.film.action import Snapshot, outlines, placed
-from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import Framing, View, fit, towards
 
 USUAL, ELEVATION = -122.0, 38.0
 """From where a product is looked at if all sides are as free [degrees]."""

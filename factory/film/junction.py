@@ -19,10 +19,10 @@ from factory.engine.mjcf.replica import Geoms, Replica
 from factory.engine.mjcf.weld_frames import held_at
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import box_of, is_stand, outlines, placed, shape_of
-from factory.floor.geometry.sight import Framing, View, fit, towards
-from factory.floor.geometry.solids import rotation
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import Framing, View, fit, towards
+from factory.support.rotations import rotation
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 

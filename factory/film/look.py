@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.elements import add, numbers
+from factory.support.xml_writer import add, numbers
 
 Colour3 = tuple[float, float, float]
 """sRGB, each from 0 to 1."""

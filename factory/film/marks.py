@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Replica
 from factory.film.action import Snapshot
+from factory.film.colours import AMBER, DEAD
 from factory.film.history import History
-from factory.film.ink import AMBER, DEAD, FLASH, Colour
 from factory.floor.layout.sweeping import APART
 from factory.support.engine import mujoco
+from factory.support.pictures.ink import FLASH, Colour
 
 Zone = tuple[float, float, float]
 """The middle and the radius of a disc on the floor [m]."""

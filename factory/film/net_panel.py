@@ -12,8 +12,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from factory.film.colours import operation_colours, robot_colours
 from factory.film.history import History, OperationProgress, Spell
-from factory.film.ink import (
+from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
+from factory.support.arrays import Array
+from factory.support.boxes import Point2
+from factory.support.pictures.ink import (
     FAINT,
     FLASH,
     GROUND,
@@ -23,16 +27,11 @@ from factory.film.ink import (
     Colour,
     Ink,
     Pixels,
+    blended,
     fitted,
-    mixed,
-    operation_colours,
     pale,
-    robot_colours,
     width,
 )
-from factory.film.sheet import PanelRow, PanelSheet, Rows, robots_shown
-from factory.floor.layout.layout import Point2
-from factory.support.arrays import Array
 from factory.theory.plant.operation import Operation
 
 WORK = 0.66
@@ -309,7 +308,7 @@ class NetPanel:
         label = fitted(operation.label, sheet.small, room)
         if room < LEAST_NOTE * sheet.scale or not label:
             return
-        dark, wide = mixed(self.colours[operation.index], INK, 0.35), width(label, sheet.small)
+        dark, wide = blended(self.colours[operation.index], INK, 0.35), width(label, sheet.small)
         x, y = left - gap - wide if free[0] > free[1] else right + gap, sheet.height(row)
         half = 0.6 * sheet.small
         ink.box(x - 1, y - half, x + wide + 1, y + half, GROUND, 0.85 * row.alpha)

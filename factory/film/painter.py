@@ -12,16 +12,17 @@ from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
 from factory.film.filament import Filament
 from factory.film.following import Lookout, Viewpoint
-from factory.film.ink import Pixels
 from factory.film.marks import Mark, Marks
-from factory.film.picture import Camera, Size
-from factory.film.smoothing import smooth
+from factory.film.picture import Camera
 from factory.film.spotlight import Spotlight
 from factory.film.studio import GOLDEN, moved, sun
-from factory.floor.geometry.sight import Framing, View
 from factory.support import gl
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.sight import Framing, View
+from factory.support.pictures.smoothing import smooth
+from factory.support.pictures.video import Size
 from factory.support.resource import Closing
 
 MANY = 110

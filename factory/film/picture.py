@@ -9,9 +9,10 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from factory.floor.geometry.sight import Framing, View, fit, tangents, towards
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.pictures.sight import Framing, View, fit, tangents, towards
+from factory.support.pictures.video import Size
 from factory.theory.problem.pag import PAG
 
 Standing = Literal["tour", "overview", "orbit", "top", "product"]
@@ -118,9 +119,6 @@ def from_above(points: Array, framing: Framing) -> View:
     upright, turned = (fit(points, towards(a, 90.0), framing) for a in (-90.0, 180.0))
     return turned if turned.distance < 0.9 * upright.distance else upright
 
-
-Size = tuple[int, int]
-"""Width and height [px]."""
 
 PanelName = Literal["net", "gantt"]
 """`net`: the net with its tokens; `gantt`: what each robot did in the last seconds."""

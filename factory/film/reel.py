@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import imageio.v3 as iio
-
 from factory.film.camerawork import Camerawork, Moment, Take
 from factory.film.finale import finale
-from factory.film.ink import Pixels
-from factory.film.video import VideoFile, check_output
-from factory.support.files import unwritten, write_bytes
+from factory.support.pictures.still import write_still
+from factory.support.pictures.video import VideoFile, check_output
 from factory.support.resource import Closing
 
 SAMPLES = 24
@@ -142,13 +139,3 @@ def save(take: Take, moment: Moment, path: Path) -> None:
     with Camerawork(take, SAMPLES) as work:
         pixels = work.picture(moment)
     write_still(path, pixels)
-
-
-def write_still(path: Path, pixels: Pixels) -> None:
-    """A picture (height, width, 3) as PNG. Raises InputError where it cannot be written."""
-    content = iio.imwrite("<bytes>", pixels, extension=".png", plugin="pillow")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, content)
-    except OSError as error:
-        raise unwritten(path, error) from error

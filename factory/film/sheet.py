@@ -15,8 +15,9 @@ from math import inf
 
 import numpy as np
 
+from factory.film.colours import AMBER, robot_colours
 from factory.film.history import History, depths, followed
-from factory.film.ink import AMBER, EDGE, FAINT, GROUND, INK, Ink, robot_colours, width
+from factory.support.pictures.ink import EDGE, FAINT, GROUND, INK, Ink, width
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 

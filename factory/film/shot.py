@@ -14,8 +14,8 @@ from factory.film.film import Film, Still
 from factory.film.history import History
 from factory.film.picture import USUAL, Picture
 from factory.film.reel import Reel, save
-from factory.film.video import FPS, check_output
 from factory.support.errors import Diagnostic, InputError, usage_error
+from factory.support.pictures.video import FPS, check_output
 
 if TYPE_CHECKING:
     from factory.engine.record.failures import Failures

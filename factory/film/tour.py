@@ -15,8 +15,8 @@ from factory.film.action import Snapshot
 from factory.film.following import Viewpoint
 from factory.film.history import TIE, History, OperationProgress
 from factory.film.junction import Handover, handover_of
-from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
+from factory.support.pictures.sight import Framing, View
 from factory.theory.plant.operation import Operation
 
 OPENING, BETWEEN = 1.5, 1.5

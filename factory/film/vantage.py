@@ -7,8 +7,8 @@ import numpy as np
 import shapely
 
 from factory.film.action import Action, outlines
-from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.support.arrays import Array
+from factory.support.pictures.sight import Framing, View, fit, towards
 
 USUAL, STEP = -62.0, 15
 """The azimuth that is preferred, and between those that are tried [degrees]."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = ["Array", "Index", "Indices", "Truth"]
+
 Array = NDArray[np.float64]
 """An array of floating-point numbers."""
 

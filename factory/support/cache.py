@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING, Any
 from factory.support.files import user_cache, write_bytes
 from factory.support.version import release
 
+__all__ = ["digest"]
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from factory.support.errors import Diagnostic, InputError
 from factory.support.guard import about_to_write
 
+__all__ = ["claimed", "claimed_again", "is_claimed"]
+
 IN_USE = "is being written by another run", "give another name, or wait until that run ends"
 """The fault of a claimed file, and its remedy."""
 

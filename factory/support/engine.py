@@ -64,4 +64,4 @@ def by_name() -> Iterator[None]:
 
 mujoco.set_mju_user_warning(_warn)
 
-__all__ = ["by_name", "mujoco", "unwarned"]
+__all__ = ["mujoco", "unwarned"]

@@ -6,6 +6,8 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+__all__: list[str] = []
+
 
 @contextmanager
 def environment(name: str, value: str) -> Iterator[None]:

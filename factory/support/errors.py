@@ -11,6 +11,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
+__all__ = ["MissingError", "Position", "StoppedError", "did_you_mean", "one_line", "usage_error"]
+
 SHOWN = 100
 """Maximum number of diagnostics that are printed; the others are counted."""
 

@@ -20,6 +20,8 @@ from typing import Any
 
 from factory.support.errors import Diagnostic, FactoryError, InputError, Position
 
+__all__ = ["bad_extension", "blaming", "extensions", "position_of"]
+
 HINT = "mend that line; docs: Extensions"
 
 

@@ -15,10 +15,25 @@ from pathlib import Path
 from factory.support.errors import Diagnostic, InputError
 from factory.support.guard import about_to_write, declare, reading
 
+__all__ = [
+    "LOG",
+    "MESH",
+    "MIB",
+    "NET",
+    "TABLE",
+    "head_of",
+    "is_net",
+    "own_names",
+    "read_bytes",
+    "unwritten",
+    "write_all",
+]
+
 LOG = b"factory-log "
 """The first bytes of a log of a run, in every version."""
 
 MIB = 1 << 20
+"""A mebibyte [bytes]."""
 
 TEXT, TABLE, NET, MESH = 32 * MIB, MIB, 256 * MIB, 256 * MIB
 """Upper bounds on the bytes of a file that is read: a text (PAG, operation, tree, bill, LDraw), a

@@ -17,6 +17,8 @@ from typing import Any
 from factory.support.errors import Diagnostic, MissingError
 from factory.support.interruption import put_off
 
+__all__ = ["probe"]
+
 APT = "apt-get install -y libegl1 libgl1"
 """On Debian, these two packages bring Mesa's EGL and its software renderer."""
 

@@ -19,6 +19,8 @@ from typing import Any, TypeVar, cast
 
 from factory.support.errors import Diagnostic, InputError
 
+__all__ = ["about_to_write", "reading"]
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 Identity = tuple[int, int]

@@ -15,6 +15,8 @@ from typing import Any, Self, TypeVar
 
 from factory.support.resource import Closing
 
+__all__ = ["Interruption"]
+
 T = TypeVar("T")
 
 SIGNALS = [

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
+__all__: list[str] = []
+
 
 class Named(str):
     """A text that names one of a few objects, and is that object: it is written as its name, and

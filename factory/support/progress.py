@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Protocol, Self
 
 from factory.support.resource import Closing
 
+__all__ = ["Progress", "StepBar", "Waiting"]
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as Bar

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Self
 
+__all__ = ["Closing"]
+
 
 class Closing:
     """A context manager that closes itself, also after an exception."""

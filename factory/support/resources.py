@@ -7,6 +7,8 @@ from pathlib import Path
 
 from factory.support.errors import Diagnostic, MissingError
 
+__all__ = ["mjcf_folder"]
+
 
 def _folder(name: str) -> Path:
     package = Path(__file__).resolve().parents[1]

@@ -7,24 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from factory.support.errors import Diagnostic, InputError
-
-RANGES = {
-    "speed": (1e-3, 100.0),
-    "acceleration": (1e-3, 1e4),
-    "eps": (1e-6, 0.02),
-    "timestep": (1e-5, 0.02),
-    "substeps": (1, 100),
-    "clearance": (1e-4, 10.0),
-    "overlap": (0.0, 0.005),
-    "force": (1e-3, 1e6),
-    "settle": (0.0, 10.0),
-    "outfeed": (1e-3, 10.0),
-    "stage": (0, 1),
-}
-"""Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
 LONGEST = 1e9
 """Upper bound on a time given by the user [s]: 30 years."""
@@ -51,9 +36,6 @@ LOOK = 0.1
 MOST = 10
 """Maximum number of ticks that the engine takes at once."""
 
-WHOLE = ("substeps", "stage")
-"""Settings that are whole numbers."""
-
 SWITCHES = ("stage",)
 """Settings that are 0 or 1, or False or True."""
 
@@ -66,6 +48,8 @@ class Settings:
     """The numbers that a layout and a run depend on, beside the product.
 
     Attributes:
+        RANGES: least and greatest value of each; beyond them a run overflows or never ends.
+        WHOLE: those that are whole numbers.
         speed: of a robot [m/s].
         acceleration: of a robot [m/s²].
         eps: radius of a goal ball [m].
@@ -87,6 +71,23 @@ class Settings:
     Raises InputError (BadValue) with every value out of its range.
     """
 
+    RANGES: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {
+            "speed": (1e-3, 100.0),
+            "acceleration": (1e-3, 1e4),
+            "eps": (1e-6, 0.02),
+            "timestep": (1e-5, 0.02),
+            "substeps": (1, 100),
+            "clearance": (1e-4, 10.0),
+            "overlap": (0.0, 0.005),
+            "force": (1e-3, 1e6),
+            "settle": (0.0, 10.0),
+            "outfeed": (1e-3, 10.0),
+            "stage": (0, 1),
+        }
+    )
+    WHOLE: ClassVar[tuple[str, ...]] = ("substeps", "stage")
+
     speed: float = 0.5
     acceleration: float = 2.0
     eps: float = 2e-4
@@ -103,10 +104,15 @@ class Settings:
         for name in SWITCHES:
             if getattr(self, name) in (False, True):
                 object.__setattr__(self, name, int(getattr(self, name)))
-        values = {name: getattr(self, name) for name in RANGES}
+        values = {name: getattr(self, name) for name in self.RANGES}
         faults_of = [wrong_type(n, v) for n, v in values.items() if (n, v) != ("substeps", None)]
         if faults := [fault for fault in faults_of if fault]:
             raise InputError(faults)
+
+    @staticmethod
+    def is_auto(name: str, value: object) -> bool:
+        """Whether a setting is AUTO, which lets the factory choose."""
+        return name == "timestep" and value == AUTO
 
     @property
     def outfeed_acceleration(self) -> float:
@@ -173,12 +179,16 @@ def environment() -> dict[str, float | str]:
     """The settings in the environment: `FACTORY_SPEED` and so on; an empty variable sets nothing.
     Raises InputError (BadValue) with every one that is no number within its range."""
     values, faults = dict[str, float | str](), []
-    for name in RANGES:
+    for name in Settings.RANGES:
         variable = f"FACTORY_{name.upper()}"
         text = os.environ.get(variable, "").strip()
         if not text:
             continue
-        value = text if is_auto(name, text) else _number(text, int if name in WHOLE else float)
+        value = (
+            text
+            if Settings.is_auto(name, text)
+            else _number(text, int if name in Settings.WHOLE else float)
+        )
         fault = wrong_type(name, value)
         if fault is not None:
             faults.append(replace(fault, message=f"in the environment {variable}: {fault.message}"))
@@ -196,21 +206,16 @@ def _number(text: str, kind: type[int] | type[float]) -> float | None:
         return None
 
 
-def is_auto(name: str, value: object) -> bool:
-    """Whether a setting is AUTO, which lets the factory choose."""
-    return name == "timestep" and value == AUTO
-
-
 def wrong_type(name: str, value: Any) -> Diagnostic | None:
     """The error of the value of a setting that is neither a number within its range nor AUTO where
     that is valid; None for a valid value."""
-    if is_auto(name, value):
+    if Settings.is_auto(name, value):
         return None
-    kind = "whole number" if name in WHOLE else "number"
-    right: bool = isinstance(value, Integral if name in WHOLE else Real)
+    kind = "whole number" if name in Settings.WHOLE else "number"
+    right: bool = isinstance(value, Integral if name in Settings.WHOLE else Real)
     if isinstance(value, bool) or not right:
         return Diagnostic("BadValue", f"{name} must be a {kind}", None, _example(name))
-    low, high = RANGES[name]
+    low, high = Settings.RANGES[name]
     if low <= value <= high:
         return None
     shown = f"{value:g}" if isinstance(value, float) else f"{value}"[:20]

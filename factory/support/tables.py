@@ -16,6 +16,8 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 from factory.support.errors import InputError, did_you_mean
 from factory.support.named import Named
 
+__all__ = ["LARGE", "MISFITS", "misfit", "table_of", "value_of"]
+
 T = TypeVar("T")
 
 MISFITS = (

@@ -5,16 +5,14 @@ Options take precedence over the environment, that over the file, and that over 
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.support.files import TABLE, read_bytes
-from factory.support.settings import MOST_BRANCHES, RANGES, WHOLE, Settings, is_auto, wrong_type
+from factory.support.settings import MOST_BRANCHES, Settings, wrong_type
+from factory.support.toml_files import key_position, read_toml
 
 NAME = "factory.toml"
 
@@ -70,9 +68,12 @@ class Defaults:
 
     def settings(self) -> Settings:
         """The settings of the file, with the built-in defaults for the others."""
-        values = {k: v for k, v in self.values.items() if k in RANGES}
+        values = {k: v for k, v in self.values.items() if k in Settings.RANGES}
         return Settings().with_options(
-            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in values.items()}
+            {
+                k: v if k in Settings.WHOLE or Settings.is_auto(k, v) else float(v)
+                for k, v in values.items()
+            }
         )
 
     def options(self) -> dict[str, Any]:
@@ -130,7 +131,7 @@ def load_defaults(path: Path) -> Defaults:
 
 def _fault(key: str, value: object) -> Diagnostic | None:
     """What is wrong with a key and its value."""
-    if key in RANGES:
+    if key in Settings.RANGES:
         return wrong_type(key, value)
     if key in (LINES, TEES):
         example = f'{"side" if key == LINES else "stem"} = ["part2", "part3"]'
@@ -142,7 +143,7 @@ def _fault(key: str, value: object) -> Diagnostic | None:
         example = 'left = { type = "six", labels = ["part2"] }'
         return _fault_of_table(key, value, lambda row: isinstance(row, dict), "tables", example)
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, TEES, PARALLEL, ARMS], "keys")
+        hint = did_you_mean(key, [*Settings.RANGES, *OPTIONS, LINES, TEES, PARALLEL, ARMS], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)
@@ -171,43 +172,3 @@ def _is_line(row: object) -> bool:
 
 def _is_number(number: object) -> bool:
     return type(number) is int and 1 <= number <= MOST_BRANCHES
-
-
-def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
-    """Text and content of a TOML file. Raises InputError, with the hint: BadFile if it cannot be
-    read, Syntax if it is not TOML."""
-    try:
-        content = read_bytes(path, TABLE)
-    except OSError as error:
-        message = f"'{path}' cannot be read: {error.strerror}"
-        raise InputError(Diagnostic("BadFile", message, None, hint)) from error
-    try:
-        text = content.decode("utf-8-sig")
-        return text, tomllib.loads(text)
-    except UnicodeDecodeError as error:
-        words = f"byte 0x{content[error.start]:02x} is not UTF-8 text"
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(_broken(path, text, str(error), hint)) from None
-    except RecursionError:
-        words = "the file is nested too deeply"
-    except ValueError:
-        words = "a number has too many digits"
-    raise InputError(Diagnostic("Syntax", words, Position(str(path), 1, 1), hint))
-
-
-def _broken(path: Path, text: str, words: str, hint: str) -> Diagnostic:
-    """The error of tomllib, at its position."""
-    match = re.search(r" \(at line (\d+), column (\d+)\)", words)
-    if match is None:
-        return Diagnostic("Syntax", words, Position(str(path), 1, 1), hint)
-    line, column = int(match[1]), int(match[2])
-    at = Position(str(path), line, column, text.splitlines()[line - 1])
-    return Diagnostic("Syntax", words.replace(match[0], ""), at, hint)
-
-
-def key_position(path: Path, text: str, key: str) -> Position:
-    """Position of a key in TOML: its first occurrence at the start of a line or in a header."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if match := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
-            return Position(str(path), number, match.start(1) + 1, line)
-    return Position(str(path), 1, 1)

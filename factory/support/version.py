@@ -11,7 +11,10 @@ from typing import Any
 from factory.support.errors import Diagnostic, MissingError
 from factory.support.interruption import put_off
 
+__all__ = ["__version__", "optional", "release"]
+
 __version__ = "0.1.0"
+"""The version of this package."""
 
 EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
     {

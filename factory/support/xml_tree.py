@@ -8,6 +8,8 @@ from xml.parsers import expat
 
 from factory.support.errors import Diagnostic, InputError, Position
 
+__all__ = ["Element", "XmlDocument"]
+
 MOST = 8_000_000
 """Greatest number of elements of a document, which take 4 GB."""
 

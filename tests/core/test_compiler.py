@@ -9,11 +9,12 @@ from hypothesis import given
 
 from factory.floor.layout.crowding import separation
 from factory.floor.layout.scrapping import not_carried_back
-from factory.floor.layout.sweeps import piles
+from factory.floor.layout.sweeps import piles_of
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.problem.pag import PAG
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 from tests.examples import with_hands
 from tests.pag_texts import PAPER, TEMPLATES, compiled
 from tests.strategies import pags
@@ -141,7 +142,7 @@ def test_the_finished_chest_would_hit_a_post() -> None:
     layout = with_hands("chest")
     assert not_carried_back(layout) == {(0, "chest")}
     path, label = layout.guidepaths[0], "chest"
-    pile = piles(layout.factory, layout.product)[label]
+    pile = piles_of(layout)[label]
     (way,) = path.sweeps(pile.box, path.length, layout.stops(0)[-2])
     posts = [r for r in layout.certificate.regions if r.robot == 7 and r.label == "front1"]
     assert min(separation(way, post.box) for post in posts) < layout.clearance

@@ -19,11 +19,10 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import bodies
 from factory.floor.mating.drawn import DrawnWays
-from factory.floor.mating.meetings import Meeting, Meetings
-from factory.floor.mating.overlaps import Finder
+from factory.floor.mating.finder import Finder
 from factory.floor.mating.paths import CLEAR, TOLERANCE, Depths
-from factory.pipeline import all_templates
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 
 TEXT = """
 root = all;
@@ -57,14 +56,6 @@ def product_of(folder: Path, sections: int, radius: float = 0.0049, turn: bool =
 
 def ways_of(product: Product) -> DrawnWays:
     return DrawnWays(bodies(product, [*product.solids]))
-
-
-def finder_of(made: Product) -> Finder:
-    """Of parts that all come together at once."""
-    labels = tuple(made.solids)
-    every = Meeting("", (), 0, 0, 0, len(labels), either=True)
-    met = Meetings(labels, (every,), np.zeros(len(labels) - 1, np.int64), np.zeros(1, np.int64))
-    return Finder(bodies(made, labels), met, as_drawn=True)
 
 
 def found(ways: DrawnWays, moving: int, standing: int, axis: int, still: bool = False) -> Depths:
@@ -179,13 +170,13 @@ def test_a_way_leads_out_of_a_small_product(tmp_path: Path) -> None:
 
 
 def test_the_keys_of_pairs_ascend_as_pairs_are_sorted(tmp_path: Path) -> None:
-    finder = finder_of(product_of(tmp_path, COARSE))
+    finder = Finder.at_once(product_of(tmp_path, COARSE))
     meeting, standing, moving = np.array([*product(range(4), range(3), range(3))]).T
     assert (np.diff(finder._key_of(meeting, moving, standing)) > 0).all()
 
 
 def test_the_room_of_a_pin_in_a_ring_is_that_of_its_bore(tmp_path: Path) -> None:
-    finder = finder_of(product_of(tmp_path, COARSE, radius=0.0049))
+    finder = Finder.at_once(product_of(tmp_path, COARSE, radius=0.0049))
     moving, standing, room = finder.rooms(2, 1e-3)
     (row,) = ((moving == PIN) & (standing == RING)).nonzero()[0]
     assert room[row] == pytest.approx([1e-4, 1e-4], abs=2e-5)

@@ -27,11 +27,11 @@ from factory.film.lettering import GLYPHS, height, lettering
 from factory.film.outfits import OUT
 from factory.film.picture import Picture
 from factory.film.skins import rounded
-from factory.film.smoothing import smooth
-from factory.floor.geometry.sight import View
 from factory.floor.layout.layout import Layout
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError, MissingError
+from factory.support.pictures.sight import View
+from factory.support.pictures.smoothing import smooth
 from tests.examples import with_hands
 from tests.slow import slow_but
 

@@ -41,10 +41,10 @@ from factory.floor.layout.nearness import distances
 from factory.floor.layout.outline import Choice, Guest, outlined
 from factory.floor.layout.presence import ACROSS
 from factory.floor.layout.shapes import symmetric_shapes
-from factory.pipeline import all_templates
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.coordinated import Coordination
 from factory.theory.problem.template import Law, Point
 from tests.examples import with_hands

@@ -19,7 +19,7 @@ from factory.engine.record.state import Event, State
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.timed import timed
+from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.layout import Layout
@@ -273,7 +273,7 @@ def test_one_unit_can_be_made_alone_and_everything_is_as_before(name: str) -> No
 def test_the_cycle_time_is_the_cycle_ratio(name: str) -> None:
     """Against the dates of a token game in which everything comes as soon as it can."""
     layout = with_hands(name)
-    made = timed(Timing(layout))
+    made = Timed.of(Timing(layout))
     times = dates(made.net, list(made.seconds), 60)
     end = layout.factory.dropoff.end
     measured = (times[end][-1] - times[end][29]) / 30

@@ -13,9 +13,9 @@ import pytest
 import factory
 from factory.apps.exports import exporters
 from factory.engine.mjcf.robots import load_robot_model
-from factory.pipeline import all_templates
+from factory.floor.robots.catalogue import load_catalogue
 from factory.theory.lang import read_pag
-from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.examples import with_hands

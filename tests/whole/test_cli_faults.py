@@ -313,7 +313,7 @@ def test_the_engine_warns_on_stderr(out: Path) -> None:
 @pytest.mark.parametrize(
     ("package", "call"),
     [
-        ("av", "from factory.film.video import _av as called"),
+        ("av", "from factory.support.pictures.video import _av as called"),
         ("mujoco.egl", "from factory.support.gl import context\ncalled = lambda: context(8, 8)"),
     ],
 )

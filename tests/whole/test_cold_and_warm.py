@@ -22,7 +22,7 @@ from rich.cells import cell_len
 from factory.apps.drawing import markup
 from factory.commands import places
 from factory.floor.geometry import meshes
-from factory.floor.mating.overlaps import Finder
+from factory.floor.mating.finder import Finder
 from factory.support import console as console_module
 from factory.support.cache import load, store
 from factory.support.files import user_cache

@@ -24,10 +24,10 @@ from factory.engine.record.ending import CutOff
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.film.video import VideoFile
 from factory.support.claim import claimed, is_claimed
 from factory.support.errors import InputError, MissingError
 from factory.support.gl import probe
+from factory.support.pictures.video import VideoFile
 from tests.command_line import Terminal, started
 from tests.layout_values import paper_layout
 from tests.paths import PAPER, ROOT, files_in

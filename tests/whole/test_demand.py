@@ -22,10 +22,11 @@ from factory.floor.layout import resting
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import STILL
 from factory.floor.layout.resting import on_demand
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
 from factory.support.errors import InputError
 from factory.theory.compiler.mixing import even
 from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.threaded import Threads
 from factory.theory.plant.demand import Demand, Word
 from factory.theory.plant.factory import Factory

@@ -19,11 +19,11 @@ from benches import drawing
 from factory.api import HOMES
 from factory.apps.exports import exporters
 from factory.commands import commands
-from factory.pipeline import all_templates
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.explanations import codes
-from factory.support.settings import RANGES
+from factory.support.settings import Settings
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.values import GEOMETRY
-from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.paths import ROOT
 from tests.slow import slow_but
@@ -186,7 +186,11 @@ def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> Non
     assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
     names = [name for row in HOMES.values() for name in row.split()]
     assert headings(reference["interface"]) == names and len(names) == len(set(names))
-    for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
+    for page, names in (
+        ("settings", Settings.RANGES),
+        ("language", GEOMETRY),
+        ("formats", exporters()),
+    ):
         rows = re.findall(r"^\| `([\w-]+)` \|", reference[page], re.M)
         assert set(names) <= set(rows), page
 

@@ -22,19 +22,20 @@ from factory.apps.few_robots.folding import (
     line_of,
     lines_of_labels,
 )
-from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.apps.runs.start import legal_marking
+from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.bounds import _Bound
 from factory.floor.layout.durations import Pace
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.history import firings, legal_marking
+from factory.theory.nets.history import firings
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import proved, verify
 from factory.theory.plant.factory import Factory
-from factory.theory.plant.programs import program_of
+from factory.theory.plant.programs import Program
 from tests.fold_values import (
     fold_layout,
     inserted,
@@ -267,16 +268,16 @@ def test_a_bottleneck_of_two_robots() -> None:
     """From sub1 to sub3 with r1, and from there with r2: longer than the gear of either."""
     factory = three_robots()
     delays = {"part1": 1.0, "part2": 5.0, "part3": 4.0, "sub1": 2.0, "sub2": 7.0, "sub3": 2.0}
-    assert cycle_time(factory, delays) == CycleTime(16.0, "r1")
-    assert cycle_time(factory, {**delays, "part2": 14.0}) == CycleTime(25.0, "r2")
-    assert cycle_time(factory, {}).seconds == 0.0
+    assert CycleTime.of(factory, delays) == CycleTime(16.0, "r1")
+    assert CycleTime.of(factory, {**delays, "part2": 14.0}) == CycleTime(25.0, "r2")
+    assert CycleTime.of(factory, {}).seconds == 0.0
     ways = {(2, factory.by_label["sub2"].index): 30.0}
-    assert cycle_time(factory, delays, ways).bottleneck == "r3"
+    assert CycleTime.of(factory, delays, ways).bottleneck == "r3"
 
 
 def test_a_dead_train_has_no_cycle_time() -> None:
     with pytest.raises(ValueError, match="live"):
-        cycle_time(_dead(), {})
+        CycleTime.of(_dead(), {})
 
 
 @pytest.mark.parametrize(
@@ -375,7 +376,7 @@ def test_two_inputs_of_one_operation_share_no_robot() -> None:
 
 def test_programs_of_a_robot_with_two_tours() -> None:
     factory = three_robots()
-    text = write_program(program_of(factory, 1))
+    text = write_program(Program.of(factory, 1))
     assert text == "\n".join(
         [
             "// r2",
@@ -401,7 +402,7 @@ def test_programs_of_a_robot_with_two_tours() -> None:
             "End Loop",
         ]
     )
-    assert "next" not in write_program(program_of(factory, 0))
+    assert "next" not in write_program(Program.of(factory, 0))
 
 
 def test_folds_are_laid_out() -> None:

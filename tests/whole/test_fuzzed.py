@@ -28,8 +28,9 @@ from factory.apps.log import plan_file
 from factory.apps.log.plan_file import plan_files
 from factory.apps.plc.signals import Commands
 from factory.commands.checking import check_net
-from factory.pipeline import all_templates, read
+from factory.pipeline import read
 from factory.support.errors import FactoryError
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.gears import GearNet
 from tests.paths import ROOT
 from tests.step_boxes import step_of

@@ -18,11 +18,11 @@ from factory.floor.layout.hands.clamp import Clamp
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.tips import shares
 from factory.floor.layout.layout import Layout
+from factory.floor.robots.reader import read_body
 from factory.pipeline import Project, read
 from factory.support.errors import InputError
 from factory.support.extensions import extensions
 from factory.theory.problem.robot_bodies import Jaw
-from factory.theory.problem.robot_reader import read_body
 from tests.paths import ROOT
 
 PAGE = (ROOT / "docs" / "guide" / "extending.md").read_text("utf-8")

@@ -20,7 +20,7 @@ LAWS: tuple[Law, ...] = (
     *(laws.engine_writes, laws.twins, laws.long_modules, laws.unexplained),
     *(laws.unguided, laws.clocks, laws.misplaced_tests, laws.variants),
     *(laws.vague, laws.reach_ins, laws.interface, laws.undocumented),
-    *(laws.named_apps,),
+    *(laws.unfit_tools, laws.named_apps),
 )
 BREACHES = r'''
 strangers: loose: on no floor
@@ -67,8 +67,6 @@ engine_imports: theory.nets.a imports the engine
 engine_imports: theory.nets.a imports the engine
   factory/theory/nets/a.py: from factory.support.engine import mujoco
   factory/support/engine.py: import mujoco
-engine_imports: commands.a imports the engine
-  factory/commands/a.py: from factory.api import mujoco
 engine_imports: film.a imports mujoco past support.engine
   factory/film/a.py: from mujoco import MjData
 engine_writes: film.a:2 writes d.qpos[3]
@@ -108,6 +106,19 @@ reach_ins: the app log reaches theory.nets.b.C
 reach_ins: the app log no longer reaches theory.nets.b.C
   factory/apps/log/a.py: from factory.api import C
   tests/reach_ins.toml: [log]\n'theory.nets.b' = ['C']
+reach_ins: the app log reaches support.b.d
+  factory/apps/log/a.py: from factory.support.b import c, d
+  factory/support/b.py: __all__ = ["c"]
+unfit_tools: support.a imports support.b
+  factory/support/a.py: __all__ = []\nfrom factory.support.b import c
+  factory/support/b.py: c = 1
+unfit_tools: support.a imports theory.nets.b
+  factory/support/a.py: __all__ = []\nfrom factory.theory.nets.b import c
+  factory/theory/nets/b.py: c = 1
+unfit_tools: support.a.c: no app uses it
+  factory/support/a.py: __all__: list[str] = ["c"]\nc = 1
+unfit_tools: support.a.c: no docstring
+  factory/support/a.py: __all__ = ["c"]\nc = 1
 interface: api.C: twice
   factory/api.py: HOMES = {'theory.nets.b': 'C', 'theory.nets.a': 'C'}
 interface: api: theory.nets.a.C is in one list only
@@ -149,6 +160,11 @@ def breaches() -> Iterator[tuple[Law, dict[str, str], str]]:
         "theory.nets.a: 351 lines",
     )
     names = " ".join(map("n{}".format, range(101)))
+    yield (
+        laws.unfit_tools,
+        {"factory/support/a.py": f"__all__ = {[*range(129)]}"},
+        "support: 129 tools",
+    )
     yield laws.interface, {"factory/api.py": f"HOMES = {{'pipeline': '{names}'}}"}, "api: 101 names"
 
 

@@ -15,10 +15,10 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.embedding import lay_out
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import read
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from factory.theory.problem.robot_types import load_catalogue
 from tests.clearance_values import check
 from tests.command_line import Terminal
 from tests.paths import ROOT

@@ -23,15 +23,15 @@ from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.floor.mating import bodies, paths
 from factory.floor.mating.depth import exact, polytope
-from factory.floor.mating.findings import LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
+from factory.floor.mating.findings import Level, Mating, Matings
 from factory.floor.mating.mating import judged as without_lifts
 from factory.floor.mating.mating import matings
 from factory.floor.mating.paths import LAST, NEAR, depths_of, sought
-from factory.pipeline import all_templates
 from factory.support.errors import Diagnostic
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang import read_pag
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.pag import PAG, AllowedOverlap
 from tests.command_line import Terminal
 from tests.pag_values import factory_of
@@ -113,7 +113,7 @@ def test_a_peg_goes_into_its_hole_along_its_axis_alone(axis: int, text: str, kin
     if kind == "blocked":
         assert mating.clashes[0].depth > 5 * MM
     else:
-        assert mating.level == STRICT
+        assert mating.level == Level.STRICT
 
 
 def test_a_box_in_a_frame_is_lowered_and_under_a_lid_is_blocked() -> None:
@@ -133,7 +133,7 @@ def test_robots_without_lifts_lower_nothing() -> None:
     assert approach is not None and approach.kind == "blocked"
 
 
-@pytest.mark.parametrize(("by", "level"), [(-0.04, NO_DEEPER)])
+@pytest.mark.parametrize(("by", "level"), [(-0.04, Level.NO_DEEPER)])
 def test_planted_fault_something_is_in_the_way_by_a_hair(by: float, level: int) -> None:
     peg = [block((-7, 7), (-20, 20), (-7, 7)), block((-8 - by, 0), (6, 20), (-7, 7))]
     peg.append(block((-8 - by, 0), (-20, -6), (-7, 7)))
@@ -385,7 +385,7 @@ def test_a_way_that_cuts_is_not_clean_however_deep_parts_are(tmp_path: Path) -> 
     nodes = expand(pag, all_templates())
     (made,) = matings(nodes, product).all
     assert made.approach.told == "pin is lowered 0.035 m"
-    assert (made.slide, made.lower) == (LEFT_OUT, NO_DEEPER)
+    assert (made.slide, made.lower) == (Level.LEFT_OUT, Level.NO_DEEPER)
     found = matings(nodes, product, lifts=False)
     assert found.faults(pag.allowed) == ()
     assert "through each other" in found.notes(pag.allowed)[0]

@@ -12,15 +12,16 @@ import pytest
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
 from factory.floor.geometry.product import product_geometry
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
 from factory.support.errors import InputError
 from factory.theory.compiler.mixing import even, orders
 from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.writer import write_pag
 from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Mix
-from factory.theory.problem.plan import NOBODY, Plan
+from factory.theory.problem.plan import Plan
 from tests.command_line import Terminal
 from tests.fold_values import pairs_of_tours, swapped
 from tests.mix_values import LITTLE, Tree, family_of, mixed_factory, random_family
@@ -151,12 +152,12 @@ def test_a_plan_makes_a_product_wholly_or_not_at_all() -> None:
     project = Project(little(), all_templates())
     turns = [list(turn) for turn in project.planned.plan.turns]
     assert project.with_plan(Plan(turns=tuple(map(tuple, turns)))).planned == project.planned
-    unit = next(turn for turn in turns if NOBODY in turn)
-    unit[next(n for n, robot in enumerate(unit) if robot != NOBODY)] = NOBODY
+    unit = next(turn for turn in turns if Plan.NOBODY in turn)
+    unit[next(n for n, robot in enumerate(unit) if robot != Plan.NOBODY)] = Plan.NOBODY
     with pytest.raises(InputError, match="nobody does some of the tours"):
         _ = project.with_plan(Plan(turns=tuple(map(tuple, turns)))).planned
     with pytest.raises(InputError, match="a turn makes no product"):
-        _ = project.with_plan(Plan(turns=((NOBODY,) * len(unit),))).planned
+        _ = project.with_plan(Plan(turns=((Plan.NOBODY,) * len(unit),))).planned
 
 
 def test_default_boxes_are_side_by_side_in_each_product() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from factory.support.settings import RANGES, Settings
+from factory.support.settings import Settings
 from factory.support.user_defaults import OPTIONS, load_defaults
 from tests.command_line import Terminal, spawn
 from tests.paths import PAPER, files_in
@@ -23,10 +23,10 @@ def test_its_factory_toml_tells_every_key_and_its_default(run: Terminal, tmp_pat
     text = (tmp_path / "x" / "factory.toml").read_text()
     assert tomllib.loads(text) == {}
     said = tomllib.loads(re.sub(r"(?m)^# (?=\w+ = )", "", text))
-    assert set(said) == {*RANGES, *OPTIONS} - {"settle", "wip"}
+    assert set(said) == {*Settings.RANGES, *OPTIONS} - {"settle", "wip"}
     usual = Settings(substeps=1)  # by default at least so many: that is all of them
-    assert {k: v for k, v in said.items() if k in RANGES} == {
-        k: getattr(usual, k) for k in RANGES if k != "settle"
+    assert {k: v for k, v in said.items() if k in Settings.RANGES} == {
+        k: getattr(usual, k) for k in Settings.RANGES if k != "settle"
     }
     (tmp_path / "x" / "factory.toml").write_text(re.sub(r"(?m)^# (?=\w+ = )", "", text))
     load_defaults(tmp_path / "x" / "factory.toml")

@@ -13,16 +13,17 @@ from factory.apps.few_robots.sharing import with_branches
 from factory.apps.runs.watched import watched
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.layout.bounds import cycle_time_bound
-from factory.floor.layout.durations import Pace, cycle_of
-from factory.pipeline import Project, all_templates, read
+from factory.floor.layout.durations import Pace
+from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import Project, read
 from factory.support.errors import InputError
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG, Parameter
-from factory.theory.problem.robot_types import load_catalogue
 from tests.command_line import Terminal
 from tests.fold_values import branched, plain, simulated_cycle, table_of
 from tests.slow import slow_but
@@ -86,7 +87,7 @@ def test_theorem_4(k: int) -> None:
     """The cycle time is the greater of that of the rest and that of the branch, divided by k."""
     factory = replicated(k)
     rest, branch = 3.0, 1.0 + 1.0 + 11.0 + 1.0
-    found = cycle_time(factory, delays(factory))
+    found = CycleTime.of(factory, delays(factory))
     assert found.seconds == pytest.approx(max(rest, branch / k))
     seconds = [*delays(factory), *[0.0] * (len(factory.net.threaded.places))]
     seconds = seconds[: len(factory.net.threaded.places)]
@@ -121,7 +122,7 @@ def test_the_floor_and_the_bound_are_those_of_one_unit() -> None:
     layout = project(3).layout
     pace = Pace.of(project(3).settings)
     bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, pace)
-    assert 10.0 / 3 < bound < cycle_of(layout, pace) < 5.0
+    assert 10.0 / 3 < bound < pace.cycle_of(layout) < 5.0
 
 
 def test_a_part_in_the_wrong_branch_is_found() -> None:

@@ -23,11 +23,11 @@ from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.geometry import decomposition
-from factory.floor.geometry.glb_reader import UPRIGHT
 from factory.floor.geometry.meshes import Mesh
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Solid
 from factory.support.arrays import Array
+from factory.support.meshes.glb_reader import UPRIGHT
 from factory.theory.problem.pag import PAG
 from tests.layout_values import table_pag
 from tests.simulation_values import layout_of, ready

@@ -10,7 +10,7 @@ from factory.engine.mjcf import model
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.engine.timing.cycle_time import cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.pool import part_pool
 from factory.support.errors import InputError
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
@@ -61,17 +61,17 @@ def test_wip_below_one_is_refused() -> None:
 def test_the_papers_cycle_time() -> None:
     factory = factory_of(paper())
     delays = {"sub3": 2.0, "sub2": 4.0, "sub1": 3.0, "part1": 1.0, "part2": 1.0, "dropoff": 1.0}
-    found = cycle_time(factory, delays)
+    found = CycleTime.of(factory, delays)
     assert (found.seconds, found.bottleneck) == (9.0, "r3")
-    assert cycle_time(factory.net, [2.0, 0.5, 4.0, 3.0, 1.0, 1.0, 1.0]) == found
-    assert cycle_time(factory, {"r4:nopart": 90.0}).bottleneck == "r4"
-    assert cycle_time(factory, {}).bottleneck == "r1"
+    assert CycleTime.of(factory.net, [2.0, 0.5, 4.0, 3.0, 1.0, 1.0, 1.0]) == found
+    assert CycleTime.of(factory, {"r4:nopart": 90.0}).bottleneck == "r4"
+    assert CycleTime.of(factory, {}).bottleneck == "r1"
 
 
 @pytest.mark.parametrize("delays", [{"sub9": 1.0}, {"sub1": -1.0}, [1.0] * 20])
 def test_delays_are_checked(delays: dict[str, float] | list[float]) -> None:
     with pytest.raises(ValueError, match=r"delays|did you mean"):
-        cycle_time(factory_of(paper()), delays)
+        CycleTime.of(factory_of(paper()), delays)
 
 
 @given(factories(30), st.data())
@@ -81,7 +81,7 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     delays = data.draw(st.lists(st.integers(0, 50), min_size=count, max_size=count))
     seconds = [float(d) for d in delays]
     found = max_cycle_ratio(marked(factory.net), seconds)
-    assert found.seconds == pytest.approx(cycle_time(factory.net, seconds).seconds)
+    assert found.seconds == pytest.approx(CycleTime.of(factory.net, seconds).seconds)
     gears = {frozenset(gear.places) for gear in factory.net.gears}
     assert frozenset(found.circuit) in gears
 

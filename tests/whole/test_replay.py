@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.apps.runs.start import legal_marking
 from factory.support.errors import InputError
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.history import firings, legal_marking
+from factory.theory.nets.history import firings
 from factory.theory.nets.replay import replay
 from factory.theory.nets.threaded import ThreadedNet
 from factory.theory.plant.factory import Factory

@@ -14,13 +14,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from factory.pipeline import Project, all_templates
+from factory.floor.robots.catalogue import load_catalogue
+from factory.floor.robots.reader import read_body
+from factory.pipeline import Project
 from factory.support.errors import InputError
 from factory.support.extensions import extensions
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.robot_bodies import ARM_TOP, CARRIAGE, CARRIAGE_TOP, MAST
-from factory.theory.problem.robot_reader import read_body
-from factory.theory.problem.robot_types import Catalogue, RobotType, load_catalogue
+from factory.theory.problem.robot_types import Catalogue, RobotType
 from tests.command_line import Terminal
 from tests.paths import PAPER, ROOT
 

@@ -15,7 +15,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.timing import Change
 from factory.floor.layout.bounds import cycle_time_bound
-from factory.floor.layout.durations import Pace, gear_times
+from factory.floor.layout.durations import Pace
 from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
 from tests.examples import without_hands
@@ -39,7 +39,7 @@ def test_the_bound_is_one_for_staged_robots(paper: Layout) -> None:
     """The paper's example comes near it, as it does without."""
     for chosen in (STILL, STAGED):
         pace = Pace.of(chosen)
-        cycle = max(gear_times(paper, pace))
+        cycle = max(pace.gear_times(paper))
         bound = cycle_time_bound(paper.factory, paper.product, paper.clearance, pace)
         assert cycle - 0.02 < bound <= cycle
 

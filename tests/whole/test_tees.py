@@ -16,13 +16,14 @@ from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.layout import Layout
-from factory.pipeline import Project, all_templates
+from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import Project
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from factory.theory.compiler.tees import on_stems
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Parameter
-from factory.theory.problem.robot_types import load_catalogue
 from factory.theory.problem.template import Template
 from tests.command_line import Terminal
 from tests.fold_values import branched, plain, table_of

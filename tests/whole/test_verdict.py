@@ -19,7 +19,7 @@ from factory.apps.runs.watched import watched
 from factory.engine.mjcf import loading, names
 from factory.engine.mjcf.model import Model
 from factory.engine.record.findings import Report, Violation
-from factory.engine.record.verdict import LIMITS, RunVerdict, judged
+from factory.engine.record.verdict import LIMITS, RunVerdict
 from factory.engine.simulation.mujoco import world as mujoco_world
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -170,12 +170,14 @@ def test_what_comes_first_is_the_cause_and_is_told_first() -> None:
     seen = [Violation(2.3 + n, "r1", "a", "Dropped", f"nothing holds a#{n}") for n in range(17)]
     report = Report((), (), tuple(seen))
     hit = {"unintended_contacts": 3, "contacts": ["r2/pad - part/p13#1/2"], "dropped_s": 2.26}
-    before = judged(dropped, True, {**hit, "contact_first_s": 2.2}, report)
+    before = RunVerdict.of(dropped, True, {**hit, "contact_first_s": 2.2}, report)
     first, second = before.gathered
     assert first.message.startswith("r2/pad hit p13 at 2.20 s; 3 unintended contacts: ")
     assert second.message == "r1 drops 'a' (and 17 more)" and not second.hint
-    after = judged(dropped, True, {**hit, "contact_first_s": 2.27}, report).gathered
+    after = RunVerdict.of(dropped, True, {**hit, "contact_first_s": 2.27}, report).gathered
     assert [line.code for line in after] == ["Dropped", "Contact"]
     assert after[0].hint == "accelerate less"
-    model = judged(dropped, True, {**hit, "faults": [["NotSolid", "r2/pad is not solid"]]}, None)
+    model = RunVerdict.of(
+        dropped, True, {**hit, "faults": [["NotSolid", "r2/pad is not solid"]]}, None
+    )
     assert model.failures[0].code == "NotSolid" and len(model.failures) == 3

@@ -20,11 +20,11 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.clearance import certify
 from factory.floor.mating.mating import matings
-from factory.pipeline import all_templates
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
 from factory.theory.compiler.expanding import expand
 from factory.theory.lang.pag_reader import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.plant.approaches import MARGIN
 from tests.examples import without_hands
 from tests.good_runs import random_marking

@@ -7,10 +7,11 @@ from math import pi
 
 import numpy as np
 
-from factory.api import Array, Factory, marked
+from factory.api import Factory, marked
 from factory.apps.drawing.canvas import Point
 from factory.apps.recovery.undo import undo
 from factory.floor.layout.way import Bend, Ways
+from factory.support.arrays import Array
 from tools.figures.sheet import PLAIN, SMALL, Sheet, around
 
 TURN, BEFORE, AFTER = 0.12, 0.26, 0.2

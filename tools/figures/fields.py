@@ -7,8 +7,9 @@ from itertools import combinations, product
 
 import numpy as np
 
-from factory.api import Array, Limits, Mode
+from factory.api import Limits, Mode
 from factory.apps.drawing.canvas import Point, number
+from factory.support.arrays import Array
 from factory.theory.control.navigation import Bundle
 from tests.navigation_functions import potential
 from tools.figures.sheet import HEAD, PLAIN, SMALL, Sheet

@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from factory.api import Diagnostic, Factory, InputError, Timing, did_you_mean, usage_error
+from factory.api import Diagnostic, Factory, InputError, Timing
 from factory.apps.analyze.firing import slacks
 from factory.apps.analyze.measured import Comparison, RunRecord, compare
 from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.apps.drawing.tables import Tabular, titled
 from factory.engine.timing.pool import part_pool
-from factory.engine.timing.timed import SAME
-from factory.engine.timing.timing import AS_IT_IS, Change
+from factory.engine.timing.timing import Change
+from factory.support.errors import did_you_mean, usage_error
 
 MOST: Mapping[str, float] = {"faster": 1e6, "shorter": 100.0}
 """The most that a robot is faster, and its ways are shorter [percent]."""
@@ -126,11 +126,11 @@ def scenario(timing: Timing, words: str, change: Change, wip: int | None) -> Sce
 def least_wip(timing: Timing) -> int:
     """The least bound on copies of each part with the full pace, by bisection: the cycle time never
     grows with the bound."""
-    full = timed_net(timing).pace
+    net = timed_net(timing)
     low, high = 0, max(part_pool(timing.factory).values()) * timing.factory.period
     while high - low > 1:
         middle = (low + high) // 2
-        enough = timed_net(timing, AS_IT_IS, middle).pace <= full * (1 + SAME)
+        enough = timed_net(timing, wip=middle).pace <= net.pace * (1 + net.SAME)
         low, high = (low, middle) if enough else (middle, high)
     return high
 
@@ -225,7 +225,7 @@ def analyse(
 
     Raises InputError if `wip` is below 1 or a mode cannot reach its goal.
     """
-    net = timed_net(timing, AS_IT_IS, wip)
+    net = timed_net(timing, wip=wip)
     products = flow(timing, net, units)
     return Analysis(
         timing,

@@ -9,11 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import NONE, Array, MarkedNet, PetriNet, Place, Timing, steady_from
+from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits
-from factory.engine.timing.timed import FEEDER, OUTFEED, SAME, Timed, timed
-from factory.engine.timing.timing import AS_IT_IS, Change
-from factory.theory.nets.earliest import earliest_firings
+from factory.engine.timing.timed import Timed
+from factory.engine.timing.timing import Change
+from factory.support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +48,9 @@ class TimedNet(Timed):
     robot its gear has as many tokens; an operation that it does alone has one position on the
     floor, so a place of one token leads back over it: one at a time. If robots go ahead while they
     wait, the slowest circuit of a gear contains those of its ways that take longer than the
-    operation. `first`: delay of the first token of a place [s], and `ready`: dates at which robots
-    that set out at time 0 have gone ahead, where these differ."""
+    operation."""
 
     named: tuple[Circuit, ...] = field(default=(), repr=False)
-    first: Mapping[int, float] = field(default_factory=dict, repr=False)
-    ready: Mapping[int, float] = field(default_factory=dict, repr=False)
 
     @property
     def units(self) -> int:
@@ -73,7 +70,7 @@ class TimedNet(Timed):
     @cached_property
     def critical(self) -> tuple[Circuit, ...]:
         """The circuits that set the pace."""
-        return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - SAME))
+        return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - self.SAME))
 
     def _bounded(self, slack: Slack) -> Circuit:
         names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
@@ -82,7 +79,7 @@ class TimedNet(Timed):
 
     def _meeting(self, others: Sequence[Circuit]) -> list[Circuit]:
         """The critical circuit, where none of the `others` is as slow."""
-        if max(circuit.pace for circuit in others) >= self.pace * (1 - SAME):
+        if max(circuit.pace for circuit in others) >= self.pace * (1 - self.SAME):
             return []
         places, robots = self.ratio.circuit, self.timing.factory.robots
         first = self.busiest[0]
@@ -94,21 +91,16 @@ class TimedNet(Timed):
         """Increase of a circuit's time from which it sets the pace [s]; for the gear of a robot,
         its waiting time in a cycle."""
         slack = self.pace * circuit.products - circuit.seconds
-        return slack if slack > SAME * self.pace else 0.0
-
-    def firings(self, units: int) -> Array:
-        """(cycles, T): the earliest dates [s] of the firings of each transition, from the initial
-        marking, for at least `units` products."""
-        cycles = -(-units // self.units)
-        return earliest_firings(self.net, self.seconds, cycles, self.first, self.ready)
+        return slack if slack > self.SAME * self.pace else 0.0
 
 
-def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> TimedNet:
+def timed_net(timing: Timing, change: Change | None = None, wip: int | None = None) -> TimedNet:
     """The timed net of a factory with a change of its robots and a bound on copies of each part.
 
     Raises InputError (BadValue) where `wip` is below 1.
     """
-    made, factory = timed(timing, change, wip), timing.factory
+    change = change or Change()
+    made, factory = Timed.of(timing, change, wip), timing.factory
     places, tokens, seconds = [*made.net.net.places], [*made.net.tokens], [*made.seconds]
     named = _gears(timing, seconds, tokens, made.ways)
     for number in _alone(timing, change):
@@ -130,8 +122,6 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         made.wip,
         made.owners,
         tuple(named),
-        timing.first,
-        made.ready,
     )
 
 
@@ -141,12 +131,12 @@ def _machines(timing: Timing, made: Timed) -> Iterator[Circuit]:
     if not coordinated.away:
         return
     trays = [p for o in factory.dropoffs for p in (o.place, coordinated.away[o.index])]
-    cycles = [(OUTFEED, trays)]
+    cycles = [(made.OUTFEED, trays)]
     for number, served in coordinated.served.items():
         if number == served.before:
             leaf = factory.operations[number]
             cycles.append(
-                (f"{FEEDER} {leaf.label}", [leaf.place, served.up, served.top, served.down])
+                (f"{made.FEEDER} {leaf.label}", [leaf.place, served.up, served.top, served.down])
             )
     for name, places in cycles:
         spent = sum(seconds[p] for p in places)
@@ -293,7 +283,7 @@ def steady_units(timing: Timing) -> int:
 
     Robots before the bottleneck fill first; until then products come at the pace of other robots.
     """
-    net = timed(timing)
+    net = Timed.of(timing)
     return reached(np.array(net.departures(MOST)), net.pace, timing.factory.period)
 
 

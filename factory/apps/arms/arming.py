@@ -11,12 +11,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from factory.api import PAG, Assembly, Catalogue, Diagnostic, Factory, InputError, Plan, Project
+from factory.api import (
+    PAG,
+    Assembly,
+    Catalogue,
+    Diagnostic,
+    Factory,
+    InputError,
+    Plan,
+    Project,
+    read_template,
+)
 from factory.apps.arms.body import STEM_MASS, mass_of
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import RAILS, dealt
 from factory.apps.arms.model import ArmModel
-from factory.theory.lang.template_reader import read_template
 from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
 from factory.theory.problem.robot_types import RobotType
 

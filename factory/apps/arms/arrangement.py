@@ -10,7 +10,7 @@ from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Operation, Point2, RunError, Solid
+from factory.api import Diagnostic, Operation, RunError, Solid
 from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
@@ -18,9 +18,10 @@ from factory.apps.arms.crew import RAILS
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal, wrist
 from factory.apps.arms.reach import Ring, ring_of
-from factory.floor.geometry.turning import about_vertical, presented
 from factory.floor.layout.dimensions import PAYLOAD
-from factory.floor.layout.guidepath import Box, hull
+from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2, hull
+from factory.support.rotations import about_vertical
 
 CLOSER = 0.02
 """How much farther from an arm than the station its feeders are [m]."""
@@ -42,6 +43,9 @@ WRIST_BACK = 0.2
 
 FAR_OFF = 9.0
 """Longer than any line [m]."""
+
+SIDES = (1.0, -1.0)
+"""The sides of the line on which arms stand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +248,7 @@ class Arrangement(Handling):
         angles, taken = [0.0, 0.0], [*map(self._span, self._lines.values())]
         fed = [label for label in self.labels(arm) if self.burdens[label].source is None]
         for number, label in enumerate(fed):
-            solid = presented(self.product.solids[label])
+            solid = self.product.solids[label].presented()
             wide = float(np.linalg.norm((solid.high - solid.low)[:2])) / 2 + APART / 2
             pitch = asin(min(1.0, wide / radius))
             room = (self.near - beside - wide) / radius
@@ -344,7 +348,3 @@ class Arrangement(Handling):
         c, s = cos(-stand.yaw), sin(-stand.yaw)
         x, y, z = place - stand.place
         return np.array([c * x - s * y, s * x + c * y, z])
-
-
-SIDES = (1.0, -1.0)
-"""The sides of the line on which arms stand."""

@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import Array, Factory, Operation, Product, Solid
+from factory.api import Factory, Operation, Product, Solid
 from factory.apps.arms.chain import steiner
 from factory.apps.arms.holds import UP, Hold, holds
+from factory.support.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,15 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Array, Factory, Hand, Point2, Product, Solid
+from factory.api import Factory, Hand, Product, Solid
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.apps.arms.holds import UP, facing_up, product_of, quaternion
 from factory.apps.arms.model import ArmModel
 from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
+from factory.support.arrays import Array
+from factory.support.boxes import Point2
 
 GAP = 2e-4
 """Between the pad of an arm and what it holds [m]."""

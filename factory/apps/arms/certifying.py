@@ -11,11 +11,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from factory.api import Array, Index
 from factory.apps.arms.chain import ConvexBody, SerialChain
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.legs import NoWay
 from factory.apps.arms.travel import travels
+from factory.support.arrays import Array, Index
 
 PIECES = 40
 """Number of equal pieces of a stretch to begin with."""

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import Array, Truth
+from factory.support.arrays import Array, Truth
 
 
 @dataclass(frozen=True, slots=True, eq=False)

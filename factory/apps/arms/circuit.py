@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Index, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SINGULAR,
@@ -22,6 +21,7 @@ from factory.apps.arms.inverse import (
     tool_lines,
 )
 from factory.apps.arms.legs import Clearance, NoWay
+from factory.support.arrays import Array, Index, Truth
 
 CROSSING = 0.02
 """Along the joint line within a branch no least singular value is below this."""

@@ -9,9 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from factory.api import Diagnostic, Factory, InputError, did_you_mean, usage_error
+from factory.api import Diagnostic, Factory, InputError
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.model import KINDS, ArmModel, own_arm
+from factory.support.errors import did_you_mean, usage_error
 
 KEYS = "type", "mjcf", "tool", "speed", "acceleration", "labels"
 """What is said of an arm; all but its labels is the same for all arms of a cell."""

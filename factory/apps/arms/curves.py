@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.dynamics import scalar_law
 from factory.apps.arms.joint_way import JointWay
+from factory.support.arrays import Array, Index
 
 SAMPLES = 600
 """Number of places on a leg at which torques are computed; between them they are interpolated."""

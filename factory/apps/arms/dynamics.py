@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.arms.chain import SerialChain, cross
 from factory.apps.arms.joint_way import JointWay, WayLimits
+from factory.support.arrays import Array
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 """In the base frame of an arm that stands upright [m/s²]."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from factory.api import Diagnostic, InputError, Project, RunError, pace, usage_error
+from factory.api import Diagnostic, InputError, Project, RunError, pace
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import RAILS, asked_arms
 from factory.apps.arms.ground import CellProject, cell_of
+from factory.support.errors import usage_error
 
 
 def with_few_arms(

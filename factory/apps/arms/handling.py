@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from factory.api import Array, Factory, Layout, Product
+from factory.api import Factory, Layout, Product
 from factory.apps.arms.body import STEM
 from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
@@ -17,8 +17,9 @@ from factory.apps.arms.holds import facing_up, product_of, quaternion
 from factory.apps.arms.lines import Line, line_of
 from factory.apps.arms.rises import Rise
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
-from factory.floor.geometry.turning import about_vertical, axis_of, presented
 from factory.floor.layout.dimensions import PAYLOAD
+from factory.support.arrays import Array
+from factory.support.rotations import about_vertical
 
 ABOVE = 0.018
 """How far above the product a payload, or an empty tool, is where a carrier may come and go [m]."""
@@ -106,13 +107,13 @@ class Handling:
         burden = self.burdens[label]
         if not burden.fed:
             return self.tip[label]
-        axis = axis_of(burden.solids[0])
+        axis = burden.solids[0].axis
         return np.asarray(about_vertical(burden.fed) @ (self.tip[label] - axis) + axis)
 
     @cached_property
     def show(self) -> float:
         """Height at which the bottoms of parts are shown that are held on top [m]."""
-        fed = (presented(b.solids[0]) for b in self.burdens.values() if b.source is None)
+        fed = (b.solids[0].presented() for b in self.burdens.values() if b.source is None)
         return shown_height([*fed], self.clearance)
 
     def shows(self, label: str) -> float:

@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Array, Solid, mujoco
+from factory.api import Solid
 from factory.apps.arms.body import PAD_RADIUS
 from factory.apps.arms.chain import cross
 from factory.apps.arms.dynamics import GRAVITY
 from factory.floor.geometry.suction import PadPlace, pad_place
 from factory.floor.layout.hands.tips import tip
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
 
 SHARES = 0.45, 0.35, 0.25
 """Radii of pads as shares of a part's least extent in plan that are tried."""

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import Array, Truth
 from factory.apps.arms.chain import SerialChain
+from factory.support.arrays import Array, Truth
 
 STEPS, TOLERANCE = 60, 1e-9
 """Steps of damped least squares from a seed, and the error at which it is at the pose [m, rad]."""

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from factory.api import Array, Layout, Operation, Pace, names
+from factory.api import Layout, Operation, Pace, names
 from factory.apps.arms.joint_way import JointWay
+from factory.support.arrays import Array
 
 if TYPE_CHECKING:  # formats are listed where the engine is not installed, too
     from factory.apps.arms.cell import CellChains

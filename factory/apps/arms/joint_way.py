@@ -13,8 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import Array, Index
 from factory.apps.arms.chain import JointLimits
+from factory.support.arrays import Array, Index
 
 SETTLED = 1e-10
 """A step of Newton's method that is shorter is the last [m]."""

@@ -13,10 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Array, Index
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.apps.arms.slowness import STIFF, way_through
+from factory.support.arrays import Array, Index
 
 Clearance = Callable[[Array], tuple[Array, Index]]
 """From configurations (m, n) to their margins (m,), the distance to what is nearest less the

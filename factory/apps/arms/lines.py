@@ -12,13 +12,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from factory.api import Array, Factory, Guidepath, Hand, Layout, Operation, Point2, Product
+from factory.api import Factory, Guidepath, Hand, Layout, Operation, Product
 from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.scene import StandingBox
 from factory.floor.layout.certificate import PAYLOAD_BODY, Region
 from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
-from factory.floor.layout.guidepath import Box, hull, moved
 from factory.floor.layout.hands.limbs import limbs
+from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2, hull, moved
 
 LANE = 0.32
 """From the station to either end of a line, without the length of what it carries [m]."""

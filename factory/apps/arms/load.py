@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, RunError
+from factory.api import Diagnostic, RunError
 from factory.apps.arms.burdens import Burden
 from factory.apps.arms.cell import ToolGrip
 from factory.apps.arms.chain import SerialChain, cross
@@ -14,6 +14,7 @@ from factory.apps.arms.crew import RAILS
 from factory.apps.arms.dynamics import GRAVITY, PLACES, torque_share
 from factory.apps.arms.joint_way import JointWay, WayLimits
 from factory.floor.layout.hands.tips import STRONG, tip
+from factory.support.arrays import Array
 
 STEP = 1e-4
 """Between the places of a difference quotient [m]."""

@@ -15,9 +15,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import InputError, mujoco, usage_error
+from factory.api import InputError
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.read import bad_arm, chain_of
+from factory.support.engine import mujoco
+from factory.support.errors import usage_error
 
 MODELS = Path(__file__).parent / "mjcf"
 """Where the arms of the catalogue are."""

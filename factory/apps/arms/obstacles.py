@@ -6,17 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Layout, RunError, Solid
+from factory.api import Diagnostic, Layout, RunError, Solid
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
 from factory.apps.arms.scene import StandingBox
-from factory.floor.geometry.turning import presented
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hands.limbs import Limb, limbs
 from factory.floor.layout.outfeed import shed_with_uprights
 from factory.floor.layout.staying import in_world
+from factory.support.arrays import Array
+from factory.support.boxes import Box
 
 BASE = 0.24
 """Height of what of an arm stands above its pedestal, at least [m]."""
@@ -49,7 +49,7 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
     for label, well in cell.wells.items():
         xlo, xhi, ylo, yhi = well.feeder.housing
         yield StandingBox(feeder_name(label), (xlo, ylo, 0.0), (xhi, yhi, well.feeder.high))
-        yield from _part(presented(cell.product.solids[label]), f"'{label}'", cell.shown(label))
+        yield from _part(cell.product.solids[label].presented(), f"'{label}'", cell.shown(label))
     for carrier, line in cell.lines.items():
         yield from line.standing
         for label, solid in line.rails.product.solids.items():

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Index, Layout, Operation, RunError, mujoco
+from factory.api import Diagnostic, Layout, Operation, RunError
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import STEM, standing
 from factory.apps.arms.cell import ToolGrip, facing
@@ -29,7 +29,9 @@ from factory.apps.arms.rises import Rise, StraightEnd
 from factory.apps.arms.scene import NEED, Scene
 from factory.apps.arms.sharing import SweptArm
 from factory.apps.arms.spared import Spared
-from factory.floor.geometry.turning import about_vertical
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
+from factory.support.rotations import about_vertical
 
 YAWS = 8
 """Number of angles at which a part may be held."""

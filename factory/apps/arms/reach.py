@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Truth
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.inverse import (
     SEEDS,
@@ -18,6 +17,7 @@ from factory.apps.arms.inverse import (
     seeds,
     solutions,
 )
+from factory.support.arrays import Array, Truth
 
 RAY, CUTS, ROUNDS = 24, 8, 4
 """Number of places on the ray that are tried first, and of those between two of them in each round

@@ -13,8 +13,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, InputError, Position, mujoco, rotation
+from factory.api import Diagnostic, InputError
 from factory.apps.arms.chain import ConvexBody, JointLimits, LinkInertia, SerialChain, steiner
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
+from factory.support.errors import Position
+from factory.support.rotations import rotation
 
 SIDES = 16
 """Number of sides of the prism round a cylinder."""

@@ -7,8 +7,8 @@ from math import ceil, pi
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.arms.holds import UP
+from factory.support.arrays import Array
 
 CURVE = 0.06
 """Length of the most of a straight end that may be rounded, beyond what stays straight [m]."""

@@ -11,9 +11,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Array, Index, mujoco
 from factory.apps.arms.model import ArmModel
 from factory.engine.mjcf.weld_frames import joints_of
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
 
 NEED = 0.01
 """Clearance on transfers [m]."""

@@ -14,11 +14,12 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import Array, Index, mujoco
 from factory.apps.arms.chain import ConvexBody, SerialChain
 from factory.apps.arms.joint_way import JointWay
 from factory.apps.arms.scene import Scene
 from factory.apps.arms.travel import travels
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
 
 STEPS, COARSE = 1024, 64
 """Number of equal steps of a way, and of those of a stretch to begin with."""

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.joint_way import JointWay, WayLimits
+from factory.support.arrays import Array
 
 STEP, FEWEST, MOST = 0.0015, 600, 4000
 """The spacing of samples of t [s at the joints' full speed], and bounds on their number."""

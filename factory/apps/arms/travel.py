@@ -12,9 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.arms.chain import ConvexBody, SerialChain
 from factory.apps.arms.joint_way import JointWay
+from factory.support.arrays import Array
 
 
 def travels(

@@ -6,8 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from factory.api import Diagnostic, Factory, InputError, did_you_mean, value_of
+from factory.api import Diagnostic, Factory, InputError
 from factory.apps.deviations.deviation import Deviation
+from factory.support.errors import did_you_mean
+from factory.support.tables import value_of
 
 
 @dataclass(frozen=True, slots=True)

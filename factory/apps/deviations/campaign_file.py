@@ -9,10 +9,12 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, get_args, get_origin, get_type_hints
 
-from factory.api import Diagnostic, Factory, InputError, Position, did_you_mean, table_of
+from factory.api import Diagnostic, Factory, InputError
 from factory.apps.deviations.campaign import CLEAR, SWAP, Campaign, Sensors, impossible
 from factory.apps.deviations.deviation import KINDS, Deviation, misfits
-from factory.support.user_defaults import key_position, read_toml
+from factory.support.errors import Position, did_you_mean
+from factory.support.tables import table_of
+from factory.support.toml_files import key_position, read_toml
 
 EXAMPLE = 'for example [[fault]], and below it kind = "drop", label = "part1", unit = 2'
 

@@ -12,16 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import (
-    Array,
-    Diagnostic,
-    Index,
-    InputError,
-    Limits,
-    Operation,
-    did_you_mean,
-)
+from factory.api import Diagnostic, InputError, Limits, Operation
 from factory.apps.deviations.deviation import Deviation, Vector
+from factory.support.arrays import Array, Index
+from factory.support.errors import did_you_mean
 
 if TYPE_CHECKING:
     from factory.api import MujocoWorld, Simulation

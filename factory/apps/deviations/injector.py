@@ -8,12 +8,13 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import NOPART, Array, Operation, Simulation
+from factory.api import NOPART, Operation, Simulation
 from factory.apps.deviations.campaign import Campaign, check_deviations
 from factory.apps.deviations.condition import Breakable, PlantCondition
 from factory.apps.deviations.deviation import KINDS, Deviation
 from factory.apps.deviations.effects import EFFECTS, Strike
 from factory.apps.deviations.kind import OCCASIONS, Occasion
+from factory.support.arrays import Array
 
 Hit = tuple[str, str, int]
 """The kind of a fault, and the label and the unit that it struck."""

@@ -12,8 +12,10 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from factory.api import Array, Index, MujocoWorld, mujoco
+from factory.api import MujocoWorld
 from factory.engine.simulation.mujoco.drives import INPUTS
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
 
 Measure = Callable[[Array, Array], tuple[Array, Array]]
 """True positions [m] and speeds [m/s] of the axes -> measured ones; called once a timestep."""

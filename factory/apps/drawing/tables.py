@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from factory.api import optional
+from factory.support.version import optional
 
 if TYPE_CHECKING:
     from pandas import DataFrame

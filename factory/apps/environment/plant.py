@@ -9,10 +9,11 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from factory.api import Picture, Simulation, usage_error
+from factory.api import Picture, Simulation
 from factory.apps.plc.driven import drive
 from factory.apps.plc.signals import Commands, Sensed
 from factory.film.film import Glimpses
+from factory.support.errors import usage_error
 
 PICTURE = Picture((640, 480), caption=False)
 """How `render` takes pictures."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.api import NOPART, Array, Operation
+from factory.api import NOPART, Operation
 from factory.apps.environment.plant import EnvAction, EnvObservation, FactoryEnv
+from factory.support.arrays import Array
 
 NEAR = 2e-4
 """An axis is at its goal within this [m]."""

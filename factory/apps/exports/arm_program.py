@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from factory.api import coordinated
 from factory.apps.arms.program_text import program_text
 from factory.apps.exports.joints import of_arms
 from factory.apps.exports.subject import Subject
-from factory.floor.layout.exclusions import coordinated
 
 FORMAT, TAKES, ENDING, FOLDER, OF = "arm-program", "cell", "txt", True, "an arm"
 

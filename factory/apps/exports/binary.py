@@ -18,7 +18,7 @@ import numpy as np
 from factory.api import Model
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 ENDING = ".mjb"
 
@@ -69,7 +69,7 @@ def kept(path: Path, key: str) -> bytes | None:
 
 def packed(m: mujoco.MjModel) -> bytes:
     """A model of the engine as the bytes of a binary file."""
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
     content = np.empty(mujoco.mj_sizeModel(m), np.uint8)
     mujoco.mj_saveModel(m, None, content)

@@ -14,8 +14,8 @@ from factory.api import (
     RunError,
     Verdict,
     certify,
+    coordinated,
     physical_model,
-    write_all,
 )
 from factory.apps.drawing.tables import titled
 from factory.apps.exports import arm_program, joints
@@ -30,10 +30,9 @@ from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
-from factory.support.files import own_names
-from factory.theory.plant.programs import program_of
+from factory.support.files import own_names, write_all
+from factory.theory.plant.programs import Program
 
 
 def _json(document: object) -> str:
@@ -52,7 +51,7 @@ class _Drawn:
 
 def _programs(what: _Drawn) -> str:
     factory = what.project.layout.factory
-    programs = (write_program(program_of(factory, robot.index)) for robot in factory.robots)
+    programs = (write_program(Program.of(factory, robot.index)) for robot in factory.robots)
     return "\n\n".join(programs) + "\n"
 
 
@@ -174,7 +173,7 @@ def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
     since the engine has accepted this model then. Raises InputError where it does not."""
     if path and kept(path, key_of(model)) is not None:
         return {}
-    from factory.engine.mjcf.loading import load
+    from factory.api import load
 
     m = load(model)
     return sealed(path, key_of(model), packed(m)) if path else {}

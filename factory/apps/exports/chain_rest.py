@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import Layout, names
-from factory.floor.layout.starting import start_positions
+from factory.api import Layout, names, start_positions
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from factory.api import Layout, Point2, optional
+from factory.api import Layout
 from factory.apps.exports.floor_plan import Flat, flat_shapes, stations
 from factory.apps.exports.subject import Subject
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.layout import Box
+from factory.support.boxes import Box, Point2
+from factory.support.version import optional
 
 FORMAT, TAKES, RAILS = "dxf", "pag", True
 

@@ -8,14 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Layout, Point2, Solid
+from factory.api import Layout, Solid, regions
 from factory.apps.drawing.canvas import hexadecimal, hull
-from factory.floor.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.floor.layout.feeding import feeder_of
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Box, Extent
-from factory.floor.layout.sweeps import piles, regions
 from factory.floor.layout.tiles import tiles_of
+from factory.support.boxes import Box, Extent, Point2
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 JUNCTION = 0.008
@@ -112,10 +110,9 @@ def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
 
 def _sweeps(layout: Layout) -> Iterator[Flat]:
     """Regions swept by payloads: the coupled ones first, so that those of every mode lie on top."""
-    swept = regions(layout, piles(layout.factory, layout.product))
-    payloads = [region for region in swept if region.kind == PAYLOAD_BODY]
+    payloads = [region for region in regions(layout) if region.is_payload]
     for style in ("coupled", "uncoupled"):
-        boxes = (r.box for r in payloads if (r.mode == ALWAYS) == (style == "uncoupled"))
+        boxes = (r.box for r in payloads if r.is_coupled == (style == "coupled"))
         yield from (Flat.of_box(style, box) for box in dict.fromkeys(boxes))
 
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array
+from factory.support.arrays import Array
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 ROUND = 28
 """Sides of a cylinder."""
@@ -18,7 +18,7 @@ ROUND = 28
 
 def half_sizes(m: mujoco.MjModel, geom: int) -> Array:
     """Half the sides (3,) of a box, or of the box round a geom of another shape [m]."""
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
     box = m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX
     return np.asarray(m.geom_size[geom] if box else m.geom_aabb[geom, 3:], float)
@@ -28,7 +28,8 @@ def triangles(m: mujoco.MjModel, geom: int) -> tuple[Array, NDArray[np.int64]]:
     """A geom's vertices (n, 3), in its own frame [m], and faces (k, 3)."""
     from trimesh import creation
 
-    from factory.api import Geoms, mujoco
+    from factory.api import Geoms
+    from factory.support.engine import mujoco
 
     kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
     if kind == mujoco.mjtGeom.mjGEOM_MESH:

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from factory.api import PAG, Array, Indices, Mesh, Product, rotation
+from factory.api import PAG, Mesh, Product
 from factory.apps.exports.subject import Subject, triangles, wanted
-from factory.engine.mjcf.mesh_files import corner_normals
-from factory.floor.geometry.glb_reader import UPRIGHT
+from factory.support.arrays import Array, Indices
+from factory.support.meshes.glb_reader import UPRIGHT
+from factory.support.meshes.triangles import corner_normals
+from factory.support.rotations import rotation
 
 WORLD = "/world"
 """The outermost node."""
@@ -77,7 +79,7 @@ def shaded(mesh: Mesh, rgba: ArrayLike) -> Any:
 def _unwelded(mesh: Mesh) -> tuple[Array, Indices, Array]:
     """Vertices, faces and normals, with a vertex for each distinct normal at a corner."""
     corners = np.concatenate(
-        [mesh.vertices[mesh.faces], np.round(corner_normals(mesh), 6)], axis=2
+        [mesh.vertices[mesh.faces], np.round(corner_normals(mesh.vertices, mesh.faces), 6)], axis=2
     ).reshape(-1, 6)
     distinct, index = np.unique(corners, axis=0, return_inverse=True)
     return distinct[:, :3], index.reshape(-1, 3).astype(np.int64), distinct[:, 3:]

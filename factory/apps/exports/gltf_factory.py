@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, Diagnostic, InputError, Mesh, names, physical_model, rotation
+from factory.api import HIDDEN, Diagnostic, InputError, Mesh, names, physical_model
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
+from factory.support.arrays import Array
+from factory.support.rotations import rotation
 
 if TYPE_CHECKING:
     from factory.api import Replica
@@ -34,9 +36,8 @@ def export(subject: Subject) -> bytes:
 
 def _state(subject: Subject) -> Replica:
     """The engine's model in the requested state."""
-    from factory.api import Replica
+    from factory.api import Replica, load
     from factory.apps.log.model import model_of
-    from factory.engine.mjcf.loading import load
 
     if isinstance(subject.source, Log):
         replica = Replica(model_of(subject.log))

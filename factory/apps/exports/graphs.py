@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from factory.api import PAG, Factory, GearNet, MarkedNet, Position, marked
+from factory.api import PAG, Factory, GearNet, MarkedNet, marked
+from factory.support.errors import Position
 
 if TYPE_CHECKING:
     import networkx as nx

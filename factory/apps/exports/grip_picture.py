@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Product
+from factory.api import Product
 from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import EDGE, ROW, PartView, ViewSheet, picture_names
 from factory.floor.layout.hands.misses import Miss, NoGrip
+from factory.support.arrays import Array
 
 HEAD, GAP, INDENT = 92.0, 108.0, 150.0
 """Height of the title, height of the words above a row of views, indentation of these."""

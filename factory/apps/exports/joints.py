@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from factory.api import Layout, Pace, usage_error
+from factory.api import Layout, Pace
 from factory.apps.arms.joint_table import joint_table
 from factory.apps.exports.subject import Subject
+from factory.support.errors import usage_error
 
 FORMAT, TAKES, ENDING, FOLDER, OF = "joints", "cell", "csv", True, "an arm"
 

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Truth, optional
 from factory.apps.exports.csv import EventRow, rows
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
+from factory.support.arrays import Array, Truth
+from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 
@@ -104,8 +105,9 @@ class _Recorder:
 
     def _shapes(self, body: int) -> dict[str, list[Any]]:
         """Foxglove's primitives of a body by the field of the entity that they belong to."""
-        from factory.api import Geoms, mujoco
+        from factory.api import Geoms
         from factory.apps.exports.geoms import half_sizes
+        from factory.support.engine import mujoco
 
         m, kinds, messages = self.m, mujoco.mjtGeom, self.messages
         shapes = {name: list[Any]() for name in ("cubes", "cylinders", "spheres", "triangles")}

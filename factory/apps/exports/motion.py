@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, Indices, Truth
+from factory.api import HIDDEN
 from factory.apps.log import Log
+from factory.support.arrays import Array, Indices, Truth
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 RATE = 50.0
 """Greatest rate of frames [1/s]."""
@@ -80,7 +81,7 @@ def motion_of(log: Log) -> BodyMotion:
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:
     """Write the pose of a body relative to its parent into `position` and `turn`."""
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
     back = np.zeros(4)
     mujoco.mju_negQuat(back, d.xquat[parent])

@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from factory.api import GearNet, MarkedNet, Place, Point2, Position, Project, Transition, marked
+from factory.api import Gear, GearNet, MarkedNet, Place, Project, Transition, coordinated, marked
 from factory.apps.drawing.markup import escape, quoteattr
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
-from factory.floor.layout.exclusions import coordinated
-from factory.theory.nets.gears import Gear
+from factory.support.boxes import Point2
+from factory.support.errors import Position
 from factory.theory.nets.threaded import Redistribution
 
 FORMAT, TAKES = "pnml", "net"

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Product, Solid
+from factory.api import Product, Solid
 from factory.apps.drawing.canvas import Box, Canvas, Point
 from factory.apps.exports.subject import file_name
+from factory.support.arrays import Array
 
 WIDTH, TALL, EDGE, BETWEEN, ROW = 560.0, 330.0, 50.0, 40.0, 36.0
 """Layout of a sheet: width and greatest height of a view, margin, distance between the two views of

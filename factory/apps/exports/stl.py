@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.api import Mesh, rotation
 from factory.apps.exports.subject import Subject, triangles, wanted
-from factory.engine.mjcf.mesh_files import stl
-from factory.floor.geometry.pieces import joined
+from factory.support.meshes.triangles import joined, stl
+from factory.support.rotations import rotation
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"
 
@@ -30,4 +29,4 @@ def write_stl(subject: Subject, label: str) -> bytes:
         mesh, turn = triangles(solid), rotation(solid.quaternion)
         bodies.append((mesh.vertices @ turn.T + solid.position, mesh.faces))
     vertices, faces = joined(bodies)
-    return stl(Mesh(label, vertices * MILLIMETRES, faces))
+    return stl(vertices * MILLIMETRES, faces)

@@ -18,15 +18,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.api import Layout, Model, names
+from factory.api import Layout, Model, names, start_positions
 from factory.apps.drawing.markup import quoteattr
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
-from factory.engine.mjcf.driving import GRAVITY
-from factory.engine.mjcf.elements import add, number, numbers
-from factory.engine.mjcf.feeders import SLIDER_MASS
-from factory.engine.mjcf.outfeed import SHUTTER_MASS
-from factory.floor.layout.feeding import outlets_of
-from factory.floor.layout.starting import start_positions
+from factory.support.xml_writer import add, number, numbers
 
 LAW = ("kp", "kv", "forcerange")
 """What an actuator of a run and the written one have in common."""
@@ -40,7 +35,7 @@ def written(model: Model) -> Model:
         for flag in option.findall("flag"):
             option.remove(flag)
         option.text = None
-    scales, weights = scales_of(model.layout), _weights(model)
+    scales, weights = scales_of(model.layout), model.weights
     for body in root.iter("body"):
         body.attrib.pop("sleep", None)
         for joint in body.findall("joint"):
@@ -58,7 +53,7 @@ def written(model: Model) -> Model:
     _add_sensors(root)
     key = add(add(root, "keyframe"), "key", name="home")
     if rests := joints_at_rest(model.layout):
-        from factory.engine.mjcf.loading import load
+        from factory.api import load
 
         qpos, ctrl = key_values(load(_with_root(model, root)), rests)
         key.attrib.update(qpos=numbers(qpos.tolist()), ctrl=numbers(ctrl.tolist()))
@@ -96,16 +91,6 @@ def scales_of(layout: Layout) -> dict[str, Scale]:
         scales[first] = Scale(back, -1.0)
         scales |= {joint: Scale(x) for (joint, _), x in zip(others, further, strict=True)}
     return scales
-
-
-def _weights(model: Model) -> dict[str, float]:
-    """What lifts, sliders and the shutter carry at the start [N], by the names of joints."""
-    hanging = (axis for axis in model.factory.axes if axis.motion.hangs)
-    masses = {names.joint(axis): axis.joint.mass for axis in hanging}
-    for outlet in outlets_of(model.layout):
-        masses[names.slider(outlet.label)] = SLIDER_MASS + model.masses[outlet.label]
-    masses[names.SHUTTER] = SHUTTER_MASS
-    return {joint: mass * GRAVITY for joint, mass in masses.items()}
 
 
 def _rescale(body: Element, joint: Element, scale: Scale) -> None:

@@ -11,17 +11,9 @@ from types import ModuleType
 
 import numpy as np
 
-from factory.api import (
-    Diagnostic,
-    GearNet,
-    InputError,
-    MarkedNet,
-    Mesh,
-    Project,
-    Solid,
-    did_you_mean,
-)
+from factory.api import Diagnostic, GearNet, InputError, MarkedNet, Mesh, Project, Solid
 from factory.apps.log import Log
+from factory.support.errors import did_you_mean
 from factory.support.extensions import blaming
 from factory.support.guard import reading
 

@@ -16,16 +16,16 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Array, Mesh, names, physical_model, rotation
+from factory.api import names, physical_model
 from factory.apps.exports.stock import written
 from factory.apps.exports.subject import Subject
-from factory.engine.mjcf.elements import add, exact, numbers
-from factory.engine.mjcf.mesh_files import stl
-from factory.floor.geometry.meshes import hull_mesh
-from factory.floor.geometry.turning import upright
+from factory.support.arrays import Array
+from factory.support.meshes.triangles import convex_hull, stl
+from factory.support.rotations import rotation, upright
+from factory.support.xml_writer import add, exact, numbers
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 FORMAT, TAKES, RAILS = "urdf", "pag", True
 
@@ -35,7 +35,7 @@ GRAM = 1e-3
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
     """The URDF; with its meshes, where there are any."""
-    from factory.engine.mjcf.loading import load
+    from factory.api import load
 
     project = subject.project
     model = written(physical_model(project.layout, 1, project.settings, project.catalogue))
@@ -56,7 +56,7 @@ class _Writer:
     def __init__(
         self, m: mujoco.MjModel, speed: float, speeds: Mapping[str, float], folder: str
     ) -> None:
-        from factory.api import mujoco
+        from factory.support.engine import mujoco
 
         self.m, self.speed, self.speeds, self.folder = m, speed, speeds, folder
         self.geom, joint = mujoco.mjtGeom, mujoco.mjtJoint
@@ -173,8 +173,8 @@ class _Writer:
         if name not in self.files:
             from factory.api import Geoms
 
-            mesh = Mesh("", *Geoms(self.m).mesh(geom))
-            self.files[name] = stl(hull_mesh(name, mesh.vertices) if hull else mesh)
+            vertices, faces = Geoms(self.m).mesh(geom)
+            self.files[name] = stl(*(convex_hull(vertices) if hull else (vertices, faces)))
         return f"{self.folder}/{name}"
 
 

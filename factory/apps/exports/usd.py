@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import optional, usage_error
 from factory.apps.exports.motion import BodyMotion, motion_of
 from factory.apps.exports.subject import Subject
 from factory.apps.log import Log
+from factory.support.errors import usage_error
+from factory.support.version import optional
 
 FORMAT, TAKES, BINARY = "usd", "log", True
 
@@ -42,7 +43,8 @@ def export(subject: Subject) -> Mapping[str, bytes]:
 
 def _record(motion: BodyMotion, log: Log, folder: str, encoding: str) -> None:
     """Write every frame with MuJoCo's exporter, in text (usda) or binary (usdc)."""
-    from factory.api import Replica, mujoco
+    from factory.api import Replica
+    from factory.support.engine import mujoco
 
     exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
     replica = Replica(motion.m)

@@ -12,14 +12,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from factory.api import Model, names
+from factory.api import Model, coordinated, names
 from factory.apps.exports.stock import Scale, scales_of
-from factory.floor.layout.exclusions import awaited_positions, coordinated
+from factory.floor.layout.exclusions import awaited_positions
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.machines import presences
-from factory.floor.layout.presence import Presence, Span
+from factory.floor.layout.presence import Presence
 
 Json = dict[str, Any]
+
+Span = tuple[float, float]
+"""Between which coordinates an axis is [m]."""
 
 
 def ways(model: Model) -> Json:

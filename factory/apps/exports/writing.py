@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from factory.api import GearNet, MarkedNet, Project, did_you_mean, usage_error
+from factory.api import GearNet, MarkedNet, Project
 from factory.apps.exports import TAKEN, Exporter, Made, exporters
 from factory.apps.exports.subject import Source, Subject
 from factory.apps.log import Log, is_log, read_log
+from factory.support.errors import did_you_mean, usage_error
 from factory.support.extensions import bad_extension, blaming, position_of
 from factory.support.files import is_net
 

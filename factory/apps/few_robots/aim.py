@@ -15,11 +15,9 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Template
+from factory.api import NOPART, PAG, Node, Template, expand
 from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
-from factory.support.settings import LEAST
-from factory.theory.compiler.expanding import Node, expand
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""
@@ -100,7 +98,7 @@ def usual_effort(labels: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Aim:
-    """Number of `robots`, LEAST for as few as found, None for any number; the `cycle` time to be
+    """Number of `robots`, "least" for as few as found, None for any number; the `cycle` time to be
     reached [s], None for the shortest. `effort`: greatest number of factories that are laid out,
     None for the default; none is begun after `seconds`. `branches`: labels, with the number of
     copies of the branch that brings each. Raises InputError (Usage) for a wrong value."""
@@ -112,7 +110,7 @@ class Aim:
     branches: Branches = ()
 
     def __post_init__(self) -> None:
-        robots = None if self.robots == LEAST else self.robots
+        robots = None if self.robots == "least" else self.robots
         seconds = None if self.seconds == inf else self.seconds
         check_values(
             {"robots": robots, "cycle": self.cycle, "effort": self.effort, "seconds": seconds}
@@ -126,9 +124,9 @@ class Aim:
     def rank(self, robots: int, seconds: float, bare: int = 0) -> tuple[float, ...]:
         """Rank of a factory, the less the better: its robots beyond those allowed, the labels
         without a hand beyond those of the product as written (`bare`), its cycle time [s]; with
-        LEAST, the number of robots before the cycle time."""
+        "least", the number of robots before the cycle time."""
         seconds = round(seconds, 3)
-        if self.robots == LEAST:
+        if self.robots == "least":
             return bare, robots, seconds
         more = max(0, robots - self.robots) if self.robots else 0
         if self.cycle is None:

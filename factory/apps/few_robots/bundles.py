@@ -15,7 +15,7 @@ from math import inf
 
 from factory.api import NOPART, Factory, Operation, Pace
 from factory.apps.few_robots.folding import Line
-from factory.floor.layout.guidepath import Box
+from factory.support.boxes import Box
 from factory.theory.compiler.folding import begun_by, kind_of, sides_of
 
 BETWEEN = 0.08

@@ -11,7 +11,7 @@ from factory.api import FactoryError, Project, Timing, pace
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.sharing import with_branches
-from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Candidate:
         infinite where there is no draft, or an operation cannot begin [s]."""
         try:
             timing = Timing(self.project.draft, self.project.settings)
-            return cycle_time(timing.factory, timing.delays, timing.ways()).seconds
+            return CycleTime.of(timing.factory, timing.delays, timing.ways()).seconds
         except FactoryError:
             return inf
 

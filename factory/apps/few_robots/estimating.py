@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
-from factory.api import Allowance, Factory, Operation, Pace, Plan, Product, Project, payload_boxes
+from factory.api import Factory, Operation, Pace, Plan, Product, Project, expand, payload_boxes
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
@@ -15,11 +15,9 @@ from factory.apps.few_robots.folding import Line
 from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_forms
 from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
-from factory.floor.geometry.fused_bodies import repeated
-from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hands.misses import NoGrip
-from factory.theory.compiler.expanding import expand
-from factory.theory.problem.plan import THIRD
+from factory.support.allowance import Allowance
+from factory.support.boxes import Box
 
 WIDE = 1.3
 """Ratio of successive bounds on cycles for LARGE products (else `aim.STEP`)."""
@@ -240,7 +238,7 @@ def _task(project: Project) -> FormsTask:
 
 
 def _boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    return payload_boxes(factory, repeated(product, factory))
+    return payload_boxes(factory, product.repeated(factory))
 
 
 def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:
@@ -252,7 +250,7 @@ def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, in
     for no_grip in project.no_grips:
         robot = robots[no_grip.robot]
         operations = [factory.operations[number] for number in robot.operations]
-        piles = [o for o in operations if forms.get(o.label, THIRD) != THIRD]
+        piles = [o for o in operations if forms.get(o.label, Plan.THIRD) != Plan.THIRD]
         carried = [o for o in piles if o.carrier == robot.index] or piles
         if carried:
             label = max(carried, key=lambda o: _in_the_way(no_grip, o, factory)).label

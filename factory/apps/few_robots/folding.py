@@ -5,19 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
-from factory.api import (
-    NOPART,
-    Catalogue,
-    Diagnostic,
-    Factory,
-    InputError,
-    Plan,
-    Position,
-    did_you_mean,
-)
+from factory.api import NOPART, Catalogue, Diagnostic, Factory, InputError, Plan
+from factory.support.errors import Position, did_you_mean
 from factory.theory.compiler.assigning import with_crew
 from factory.theory.compiler.folding import begun_by, kind_of, sides_at, sides_of
-from factory.theory.problem.plan import NOBODY
 
 Line = tuple[int, ...]
 """The tours of a line, as the robots of the factory that is folded."""
@@ -84,7 +75,7 @@ def lines_of(plan: Plan) -> tuple[Line, ...]:
     they are done."""
     on: dict[int, list[int]] = {}
     for tour, robots in enumerate(zip(*plan.turns, strict=True)):
-        on.setdefault(next(r for r in robots if r != NOBODY), []).append(tour)
+        on.setdefault(next(r for r in robots if r != Plan.NOBODY), []).append(tour)
     return tuple(tuple(tours) for tours in on.values() if len(tours) > 1)
 
 

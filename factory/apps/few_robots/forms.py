@@ -18,12 +18,10 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.api import PAG, Assembly, Pace, Template
+from factory.api import PAG, Assembly, Node, Pace, Plan, Template, expand
 from factory.apps.few_robots.lines import Admitted
-from factory.floor.layout.guidepath import Box
-from factory.floor.mating.findings import BLOCKED, NO_DEEPER
-from factory.theory.compiler.expanding import Node, expand
-from factory.theory.problem.plan import THIRD
+from factory.floor.mating.findings import Level
+from factory.support.boxes import Box
 
 APART = 0.06
 """Length of guidepath from one station to the next, beside the sub-assembly [m]."""
@@ -49,7 +47,7 @@ class Option:
     over: float
     robots: int
     time: float
-    pile: int = THIRD
+    pile: int = Plan.THIRD
     inputs: tuple[Option, ...] = ()
     lines: int = 1
     order: Order = "robots"
@@ -127,7 +125,7 @@ def written_forms(task: FormsTask) -> dict[str, int]:
     """The forms of a product as written: the first two inputs of a statement go to a third robot,
     each further one to the pile."""
     return {
-        label: THIRD if task.nodes[label].template == template else 0
+        label: Plan.THIRD if task.nodes[label].template == template else 0
         for label, template in task.free.items()
     }
 
@@ -144,7 +142,7 @@ def _options(
     if not node.inputs:
         yield Option(0, 0, 0.0, 0, task.pace.lost, order=task.order)
         return
-    for pile in (THIRD, 0, 1) if node.label in task.free else (node.held,):
+    for pile in (Plan.THIRD, 0, 1) if node.label in task.free else (node.held,):
         faults = _faults(task, node, axis, pile)
         for inputs in _combined([options[n != pile] for n, options in enumerate(each)]):
             yield _joined(task, node, pile, inputs, bound, faults)
@@ -181,7 +179,7 @@ def _joined(
     come = [task.size(x) for n, x in enumerate(node.inputs) if n != pile]
     step = max(come, default=0.0) + APART
     time += task.pace.rest(step) + node.dwell + task.pace.lost
-    time += 0.0 if pile == THIRD else step / task.pace.speed
+    time += 0.0 if pile == Plan.THIRD else step / task.pace.speed
     lines = _lines(node, pile, inputs)
     return Option(blocked, loose, over, robots, time, pile, inputs, lines, task.order)
 
@@ -191,7 +189,7 @@ def _lines(node: Node, pile: int, inputs: tuple[Option, ...]) -> int:
     robot of a pile one, shared by those that come one after the other."""
     if len(node.inputs) < 2:
         return inputs[0].lines
-    if pile == THIRD:
+    if pile == Plan.THIRD:
         return 1 + sum(option.lines for option in inputs)
     return max(o.lines if n == pile else o.lines + 1 for n, o in enumerate(inputs))
 
@@ -229,7 +227,7 @@ def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int
     if len(node.inputs) > 2:
         lowers = lowers[-1:]
     level = max(admits.slides[axis], *lowers)
-    return int(level == BLOCKED), int(level < NO_DEEPER)
+    return int(level == Level.BLOCKED), int(level < Level.NO_DEEPER)
 
 
 def joins(node: Assembly) -> Iterator[str]:

@@ -12,16 +12,11 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Catalogue, Factory, Pace, Plan, Product, marked
+from factory.api import Catalogue, Factory, Finder, Node, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
-from factory.floor.layout.guidepath import Box
-from factory.floor.mating.bodies import bodies
-from factory.floor.mating.findings import STRICT
-from factory.floor.mating.mating import UPRIGHT, levels_of
-from factory.floor.mating.meetings import meetings
-from factory.floor.mating.overlaps import Finder
-from factory.theory.compiler.expanding import Node
+from factory.floor.mating.findings import Level
+from factory.support.boxes import Box
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
@@ -172,19 +167,20 @@ class Admitted:
     """The best levels (`findings`) of one operation: its inputs `slides` along x and y from the
     better side; the first, or the last of them is lowered (`lowers`)."""
 
-    slides: tuple[int, int] = (STRICT, STRICT)
-    lowers: tuple[int, int] = (STRICT, STRICT)
+    slides: tuple[int, int] = (Level.STRICT, Level.STRICT)
+    lowers: tuple[int, int] = (Level.STRICT, Level.STRICT)
 
 
 def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:
     """The levels of each operation with two inputs or more, by its label, whichever robot holds the
     pile: the choice of forms is made from them. As costly as `matings` twice."""
-    met = meetings(nodes)
-    if not met.all:
+    finder = Finder.of(product, nodes)
+    meetings = finder.meetings.all
+    if not meetings:
         return {}
-    finder, count = Finder(bodies(product, met.parts), met), len(met.all)
+    count = len(meetings)
     every = np.ones(count, bool)
-    slides = [levels_of(finder.along(axis, every), count)[0].max(axis=1) for axis in (0, 1)]
-    lowers = levels_of(finder.along(UPRIGHT, every), count)[0]
-    rows = zip(met.all, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
+    slides = [finder.along(axis, every).levels(count)[0].max(axis=1) for axis in (0, 1)]
+    lowers = finder.lowering(every).levels(count)[0]
+    rows = zip(meetings, *(s.tolist() for s in slides), lowers.tolist(), strict=True)
     return {m.label: Admitted((x, y), (first, last)) for m, x, y, (first, last) in rows}

@@ -20,8 +20,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from math import lcm
 
-from factory.api import NOPART, Diagnostic, Factory, InputError, Plan, Position, did_you_mean
+from factory.api import NOPART, Diagnostic, Factory, InputError, Plan
 from factory.apps.few_robots.tees import ROOM
+from factory.support.errors import Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
 
 Branches = Sequence[tuple[str, int]]

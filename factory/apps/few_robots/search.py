@@ -14,13 +14,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from math import inf
 
-from factory.api import Allowance, Diagnostic, InputError, Project
+from factory.api import Diagnostic, InputError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimator
 from factory.apps.few_robots.folding import kept_apart, lines_of
-from factory.theory.problem.plan import THIRD
+from factory.support.allowance import Allowance
 
 CHANGES = 60
 """Number of changes in a row without improvement after which the search ends."""
@@ -196,6 +196,6 @@ class Search:
         first = [] if self._exceeds(best) or not best.has_layout else best.of_the_slowest()
         order = dict.fromkeys(label for label in (*first, *best.forms) if label in best.forms)
         for label in order:
-            for form in (THIRD, 0, 1):
+            for form in (Plan.THIRD, 0, 1):
                 if form != best.forms[label]:
                     yield self._candidate({**best.forms, label: form}, best.filling)

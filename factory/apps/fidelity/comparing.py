@@ -18,7 +18,6 @@ from factory.api import (
     Settings,
     Simulation,
     Timing,
-    mujoco,
 )
 from factory.apps.analyze.measured import operation_times
 from factory.apps.analyze.timed import steady_units
@@ -26,6 +25,7 @@ from factory.apps.fidelity.measuring import Measurement
 from factory.apps.fidelity.record import QUANTITIES, Fidelity, SeedRecord
 from factory.apps.sweep.workers import over_workers
 from factory.engine.mjcf.model import product_name
+from factory.support.engine import mujoco
 
 WORST = 10
 """Number of penetrations that are listed for each seed."""

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Index, Layout, Simulation, mujoco, names, physical_model
+from factory.api import Layout, Simulation, load, names, physical_model
 from factory.apps.fidelity.record import Penetration
 from factory.apps.fidelity.solid import SolidReplica
-from factory.engine.mjcf.loading import load
-from factory.theory.plant.approaches import Pair
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
 
 TOUCH = 1e-6
 """Penetration up to which two things only touch; differences up to that do not count [m]."""
@@ -37,7 +37,7 @@ class HiddenPenetrations:
     """The deepest penetrations of any two things in poses of a model `m`, over all their copies.
     `overlaps`: penetration of two parts in the finished product [m]."""
 
-    def __init__(self, m: mujoco.MjModel, overlaps: Mapping[Pair, float]) -> None:
+    def __init__(self, m: mujoco.MjModel, overlaps: Mapping[tuple[str, str], float]) -> None:
         self.replica = SolidReplica(m)
         self.names = [m.geom(i).name for i in range(m.ngeom)]
         self._overlaps = {frozenset(pair): depth for pair, depth in overlaps.items()}
@@ -87,7 +87,7 @@ class HiddenPenetrations:
         return max((p.depth_mm for p in self._deepest.values()), default=0.0)
 
 
-def overlaps_of(layout: Layout) -> dict[Pair, float]:
+def overlaps_of(layout: Layout) -> dict[tuple[str, str], float]:
     """How far parts of a product must recede from each other so that they do not overlap [m]."""
     return {o.parts: max(far for _, _, far in o.bodies) for o in layout.overlaps if o.bodies}
 

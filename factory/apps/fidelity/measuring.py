@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, MujocoWorld, Run, Simulation, State, mujoco
+from factory.api import MujocoWorld, Run, Simulation, State
 from factory.apps.fidelity.hidden import HiddenPenetrations
 from factory.apps.monitor import beside
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
 
 FULL = 0.999
 """Share of its limit from which a force is saturated."""

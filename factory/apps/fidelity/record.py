@@ -9,9 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from factory.api import Diagnostic
+from factory.api import Diagnostic, RunVerdict
 from factory.apps.drawing.tables import Tabular
-from factory.engine.record.verdict import MOST
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +140,7 @@ _ALL = (
 )
 
 QUANTITIES: Mapping[str, Quantity] = MappingProxyType(
-    {q.key: replace(q, limit=MOST.get(q.key, q.limit)) for q in _ALL}
+    {q.key: replace(q, limit=RunVerdict.MOST.get(q.key, q.limit)) for q in _ALL}
 )
 """Every quantity by its key, in the order of the reports, with the limits of a run's verdict."""
 

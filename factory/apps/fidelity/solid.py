@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import HIDDEN, Array, Index, Replica, Truth, mujoco, names
+from factory.api import HIDDEN, Replica, names
 from factory.engine.mjcf.replica import SHOWN
+from factory.support.arrays import Array, Index, Truth
+from factory.support.engine import mujoco
 
 
 class SolidReplica(Replica):

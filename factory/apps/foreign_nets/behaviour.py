@@ -14,23 +14,15 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import (
-    NONE,
-    GearNet,
-    MarkedNet,
-    Position,
-    Verdict,
-    collector_paused,
-    listing,
-    marked,
-    token_free,
-)
+from factory.api import NONE, GearNet, MarkedNet, Verdict, listing, marked, token_free
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
-from factory.theory.nets.composition import compose
+from factory.support.collector import collector_paused
+from factory.support.errors import Position
+from factory.theory.nets.composition import Composition
 from factory.theory.nets.marked import stuck_circuit
 from factory.theory.nets.train import no_way_back
-from factory.theory.nets.verdict import Defect, verdict
+from factory.theory.nets.verdict import Defect
 from factory.theory.nets.verify import legality_defects, shape_defects
 
 WORK = 5_000_000
@@ -63,7 +55,7 @@ def analyse(
     if against:
         illegal: tuple[Defect, ...] = (Defect("legal", "undecided", NO_GEARS),)
     else:
-        composition = compose(subject)
+        composition = Composition.of(subject)
         closed = composition.closed
         against, train = shape_defects(net, subject, composition)
         illegal = legality_defects(net, subject)
@@ -71,7 +63,7 @@ def analyse(
         method, defects = "structure", _of_marked_graph(subject, closed)
     else:
         method, defects = "exploration", _explored(subject, explore(subject, limit))
-    return verdict(subject, (*against, *defects, *illegal), train, sources, method)
+    return Verdict.of(subject, (*against, *defects, *illegal), train, sources, method)
 
 
 def _of_marked_graph(net: MarkedNet, closed: Sequence[bool]) -> Iterator[Defect]:

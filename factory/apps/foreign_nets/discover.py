@@ -12,17 +12,17 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, MarkedNet, PlaceId, TransitionId, listing
-from factory.theory.nets.composition import MOST, no_gear_net, notation
-from factory.theory.nets.gears import Gear
+from factory.api import NONE, Gear, MarkedNet, listing
+from factory.theory.nets.composition import MOST, notation
 from factory.theory.nets.marked import MANY
 from factory.theory.nets.verdict import Defect
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
     """The gears of a gear net, named g1, g2, ..., or the reasons for which it is none."""
     if not net.net.places:
-        return (), (no_gear_net("no gear", "the net has no places"),)
+        return (), (Defect.no_gear_net("no gear", "the net has no places"),)
     shared = _shared(net)
     against = tuple(islice(_local(net, shared), MOST))
     if against:
@@ -34,7 +34,7 @@ def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
         event = min(node for node in apart[0] if node >= 0)
         name = net.net.transitions[event].name
         text = f"{name} cannot be reached: the net is not connected"
-        return (), (no_gear_net("gears apart", text, transitions=[event]),)
+        return (), (Defect.no_gear_net("gears apart", text, transitions=[event]),)
     circuits = []
     for component in nx.biconnected_components(whole):
         part = graph.subgraph(component)
@@ -63,27 +63,31 @@ def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Defect]:
     for place, (before, after) in enumerate(zip(net.left, net.right, strict=True)):
         called = f"place {net.net.places[place].name} = {notation(net, place)}"
         if before == NONE:
-            yield no_gear_net("missing producer", f"nothing marks {called}", places=[place])
+            yield Defect.no_gear_net("missing producer", f"nothing marks {called}", places=[place])
         if after == NONE:
-            yield no_gear_net("missing consumer", f"nothing takes from {called}", places=[place])
+            yield Defect.no_gear_net(
+                "missing consumer", f"nothing takes from {called}", places=[place]
+            )
         if MANY in (before, after):
             text = f"{called} is not of the form [x; y]: the net has choice there"
-            yield no_gear_net("choice", text, places=[place])
+            yield Defect.no_gear_net("choice", text, places=[place])
         if before == after >= 0:
             text = f"{called} is a 1-gear, which is dead (Definition 3.4)"
-            yield no_gear_net("1-gear", text, places=[place])
+            yield Defect.no_gear_net("1-gear", text, places=[place])
     for event, (preset, postset) in enumerate(zip(net.net.preset, net.net.postset, strict=True)):
         called = net.net.transitions[event].name
         if not preset or not postset:
             kind = "missing consumer" if preset else "missing producer"
             side = "leads to" if preset else "waits for"
-            yield no_gear_net(kind, f"transition {called} {side} no place", transitions=[event])
+            yield Defect.no_gear_net(
+                kind, f"transition {called} {side} no place", transitions=[event]
+            )
         elif (preset[1:] and postset[0] not in shared) or (postset[1:] and preset[0] not in shared):
             text = (
                 f"places that lead to {called}: {len(preset)}, from it: {len(postset)}; the gears"
                 " that meet there share no one place [a; b]"
             )
-            yield no_gear_net("no shared place", text, (), preset + postset, [event])
+            yield Defect.no_gear_net("no shared place", text, (), preset + postset, [event])
 
 
 def _contracted(net: MarkedNet, shared: frozenset[int]) -> nx.DiGraph:
@@ -102,12 +106,14 @@ def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Defect:
     for strong in nx.strongly_connected_components(part):
         if len(strong) == 1 and (place := ~next(iter(strong))) >= 0:
             called = f"place {net.net.places[place].name} = {notation(net, place)}"
-            return no_gear_net("unclosed gear", f"{called} lies on no circuit", places=[place])
+            return Defect.no_gear_net(
+                "unclosed gear", f"{called} lies on no circuit", places=[place]
+            )
     node = next(node for node in part if part.degree(node) > 2)
     places = sorted(~place for place in {*part.predecessors(node), *part.successors(node)})
     names = listing(net.net.places[place].name for place in places)
     text = f"circuits through {names} cross twice: some circuit is no gear"
-    return no_gear_net("two gears cross twice", text, places=places)
+    return Defect.no_gear_net("two gears cross twice", text, places=places)
 
 
 def _gear(

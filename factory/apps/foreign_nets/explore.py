@@ -8,7 +8,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from factory.api import MarkedNet, TransitionId
+from factory.api import MarkedNet
+from factory.theory.problem.ids import TransitionId
 
 LIMIT = 200_000
 """Greatest number of markings that are explored."""

@@ -12,25 +12,14 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from factory.api import (
-    NONE,
-    GearNet,
-    MarkedNet,
-    PetriNet,
-    Place,
-    PlaceId,
-    Position,
-    Transition,
-    TransitionId,
-    collector_paused,
-    did_you_mean,
-    read_text,
-)
+from factory.api import NONE, Gear, GearNet, MarkedNet, PetriNet, Place, Transition, read_text
+from factory.support.collector import collector_paused
+from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.nets.composition import compose
-from factory.theory.nets.gears import Gear
+from factory.theory.nets.composition import Composition
 from factory.theory.nets.threaded import Redistribution, ThreadedNet
+from factory.theory.problem.ids import PlaceId, TransitionId
 
 N = TypeVar("N", bound=int)
 Events = list[TransitionId]
@@ -132,7 +121,7 @@ class _Reader:
         try:
             return GearNet(ThreadedNet(net.net, redistribution), gears, initial, slots)
         except ValueError as error:
-            if not compose(loose).defects:
+            if not Composition.of(loose).defects:
                 hint = "name each slot before and after it once, or leave the notes out"
                 self.fault(elements[0], str(error), hint)
                 self.stop()

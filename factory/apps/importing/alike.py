@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from factory.floor.geometry.alike import PartShape, RigidMotion, motion_between
+from factory.support.meshes.alike import PartShape, RigidMotion, motion_between
 
 
 @dataclass(frozen=True, slots=True)

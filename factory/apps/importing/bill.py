@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from types import MappingProxyType
 
-from factory.api import Diagnostic, InputError, Position
+from factory.api import Diagnostic, InputError, Value
 from factory.apps.importing.bill_header import Header, HeaderReader
 from factory.apps.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.apps.importing.part_maker import PartMaker, Placement
 from factory.apps.importing.tree_file import mesh_name
-from factory.theory.lang.source import Source, quoted
+from factory.support.decimals import number
+from factory.support.errors import Position
+from factory.support.texts import Source, quoted
 from factory.theory.lang.values import GEOMETRY
-from factory.theory.lang.words import number
-from factory.theory.problem.pag import Value
 
 MOST_COPIES = 10_000
 """The greatest quantity of a row."""

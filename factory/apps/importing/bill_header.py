@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from factory.api import Position, did_you_mean
 from factory.apps.importing.draft import ImportFaults
-from factory.theory.lang.source import quoted
-from factory.theory.lang.words import UNITS
+from factory.support.decimals import UNITS
+from factory.support.errors import Position, did_you_mean
+from factory.support.texts import quoted
 
 TITLES: Mapping[str, str] = MappingProxyType(
     {

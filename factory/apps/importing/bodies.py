@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, Indices, InputError
+from factory.api import Diagnostic, InputError
 from factory.apps.importing.zipping import zipped
-from factory.floor.geometry.glb_reader import Colour
-from factory.floor.geometry.mesh_file import MeshFile, areas_of
-from factory.floor.geometry.meshes import is_closed, volume_of
-from factory.floor.geometry.pieces import MOST_PIECES, components, submeshes
-from factory.floor.geometry.touching import bodies as shells
-from factory.theory.lang.source import quoted
-from factory.theory.lang.words import UNITS as LENGTHS
+from factory.floor.geometry.pieces import MOST_PIECES
+from factory.support.arrays import Array, Indices
+from factory.support.decimals import UNITS as LENGTHS
+from factory.support.meshes.bodies import bodies as shells
+from factory.support.meshes.glb_reader import Colour
+from factory.support.meshes.mesh_file import MeshFile
+from factory.support.meshes.triangles import areas_of, components, is_closed, submeshes, volume_of
+from factory.support.texts import quoted
 
 UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""

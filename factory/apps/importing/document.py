@@ -13,9 +13,11 @@ from typing import Any, Literal
 from lark import Lark, Token, Transformer, v_args
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from factory.api import Diagnostic, InputError, Position, optional
-from factory.theory.lang.source import Source, quoted
-from factory.theory.lang.words import is_number
+from factory.api import Diagnostic, InputError
+from factory.support.decimals import is_number
+from factory.support.errors import Position
+from factory.support.texts import Source, quoted
+from factory.support.version import optional
 
 Kind = Literal["object", "list", "text", "number", "boolean", "null"]
 

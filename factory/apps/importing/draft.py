@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Position, Product
+from factory.api import PAG, Assembly, Diagnostic, InputError, Parameter, Product
 from factory.floor.geometry.overlapping import overlaps_of
-from factory.theory.lang.source import where
+from factory.support.errors import Position
+from factory.support.texts import where
 from factory.theory.lang.words import is_label
-from factory.theory.problem.pag import RESERVED, AllowedOverlap, Parameter
+from factory.theory.problem.pag import RESERVED, AllowedOverlap
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""

@@ -7,16 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from factory.api import (
-    PAG,
-    Diagnostic,
-    InputError,
-    Template,
-    collector_paused,
-    did_you_mean,
-    read_text,
-    write_pag,
-)
+from factory.api import PAG, Diagnostic, InputError, Template, read_text, write_pag
 from factory.apps.importing.bill import BillReader
 from factory.apps.importing.document import read_json, read_yaml
 from factory.apps.importing.draft import DraftNode, ImportFaults, Mates, assemble, file_stem
@@ -24,8 +15,10 @@ from factory.apps.importing.ldraw.model import read_ldraw
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import PartMaker
 from factory.apps.importing.tree_file import TreeReader
+from factory.support.collector import collector_paused
+from factory.support.errors import did_you_mean
+from factory.support.texts import quoted, source_of
 from factory.theory.lang.operations import signature
-from factory.theory.lang.source import quoted, source_of
 
 LDRAW, YAML, JSON, BILL = (".ldr", ".mpd", ".dat"), (".yaml", ".yml"), (".json",), (".csv", ".tsv")
 KINDS = (*LDRAW[:2], *JSON, *YAML, *BILL)
@@ -92,8 +85,8 @@ def import_product(
 
 def _allowing(pag: PAG, files: Mapping[str, bytes]) -> PAG:
     """An LDraw model in which parts may overlap as much as drawings without fits do."""
+    from factory.api import product_geometry
     from factory.apps.importing.draft import everywhere
-    from factory.floor.geometry.product import product_geometry
 
     try:
         return replace(pag, allowed=everywhere(product_geometry(pag, files)))

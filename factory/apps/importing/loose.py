@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import PAG, Array, Diagnostic, Indices, InputError, Position, read_bytes
+from factory.api import PAG, Diagnostic, InputError, Parameter
 from factory.apps.importing.alike import alike
 from factory.apps.importing.bodies import Bodies, FileBody, apart, check_count, unit_of
 from factory.apps.importing.colours import colours_by_size, kinds_of
@@ -24,11 +24,12 @@ from factory.apps.importing.importer import Imported
 from factory.apps.importing.mesh_files import MeshStore, natural, obj_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.importing.scene_file import MESHES, SCENES, read_one, read_scene
-from factory.floor.geometry.alike import PartShape, shape_of
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
-from factory.support.files import MESH
-from factory.theory.lang.source import quoted
-from factory.theory.problem.pag import Parameter
+from factory.support.arrays import Array, Indices
+from factory.support.errors import Position
+from factory.support.files import MESH, read_bytes
+from factory.support.meshes.alike import PartShape, shape_of
+from factory.support.meshes.mesh_file import ANEW, UnreadableMesh
+from factory.support.texts import quoted
 
 
 def bodies_in(path: Path) -> Bodies:

@@ -10,9 +10,10 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from factory.api import Array, Assembly, Indices, read_bytes
+from factory.api import Assembly
 from factory.apps.importing.draft import file_stem
-from factory.support.files import MESH
+from factory.support.arrays import Array, Indices
+from factory.support.files import MESH, read_bytes
 
 
 def path_inside(name: str) -> PurePosixPath | None:

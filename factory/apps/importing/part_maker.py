@@ -10,16 +10,19 @@ from warnings import catch_warnings
 
 import numpy as np
 
-from factory.api import Array, Position, read_bytes, rotation
+from factory.api import Parameter, Value
 from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.mesh_files import MeshStore, first_file, path_inside
-from factory.floor.geometry.mesh_file import ANEW, UnreadableMesh
-from factory.floor.geometry.mesh_reader import read_mesh
-from factory.support.files import MESH
+from factory.support.arrays import Array
+from factory.support.errors import Position
+from factory.support.files import MESH, read_bytes
+from factory.support.meshes.mesh_file import ANEW, UnreadableMesh
+from factory.support.meshes.mesh_reader import read_mesh
+from factory.support.rotations import rotation
+from factory.support.texts import near_file, quoted
 from factory.theory.lang.operations import MESHES
-from factory.theory.lang.source import near_file, quoted
 from factory.theory.lang.values import GEOMETRY
-from factory.theory.problem.pag import SHAPES, Parameter, Value
+from factory.theory.problem.pag import SHAPES
 
 CLEAN, NOISE = 0.1, 1e-6
 """A clean rotation is by multiples of so many degrees about the axes; one that differs from it by

@@ -18,9 +18,10 @@ from xml.parsers import expat
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.glb_reader import MOST, GlbBody, moved_by
-from factory.floor.geometry.mesh_file import EXPECTED, UnreadableMesh
 from factory.support.files import MESH, MIB
+from factory.support.meshes.glb_reader import MOST, GlbBody
+from factory.support.meshes.mesh_file import EXPECTED, UnreadableMesh
+from factory.support.meshes.triangles import moved_by
 
 UNITS = {
     "micron": 1e-6,

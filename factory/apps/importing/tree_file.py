@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.api import did_you_mean
+from factory.api import Parameter, Value
 from factory.apps.importing.document import DocumentNode as Node
 from factory.apps.importing.draft import (
     MATE,
@@ -18,10 +18,11 @@ from factory.apps.importing.draft import (
     too_many,
 )
 from factory.apps.importing.part_maker import PartMaker, Placement
+from factory.support.errors import did_you_mean
+from factory.support.texts import quoted
 from factory.theory.lang.operations import MESHES, Signature
-from factory.theory.lang.source import quoted
 from factory.theory.lang.values import GEOMETRY, Kind
-from factory.theory.problem.pag import SHAPES, Parameter, Value
+from factory.theory.problem.pag import SHAPES
 
 GROUP = ("name", "children", "operation", "parameters", "at", "quat")
 LEAF = ("name", "part", "at", *(name for name in GEOMETRY if name not in ("pos", "mesh")))

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Array, Indices
-from factory.floor.geometry.mending import SLIVERS
-from factory.floor.geometry.mesh_file import areas_of
+from factory.support.arrays import Array, Indices
+from factory.support.meshes.mending import SLIVERS
+from factory.support.meshes.triangles import areas_of
 
 
 def zipped(vertices: Array, faces: Indices) -> Indices:

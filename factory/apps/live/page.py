@@ -7,13 +7,14 @@ from html import escape
 
 import numpy as np
 
-from factory.api import HIDDEN, Array, MonitorSubject, Operation, Replica, Simulation, names
+from factory.api import HIDDEN, MonitorSubject, Operation, Replica, Simulation, names
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
 from factory.apps.report.page import counts, filled, options, paints
 from factory.apps.report.scene import DrawnFactory, Pack, drawn, scene, stations
 from factory.apps.report.sections import assembly_tree
+from factory.support.arrays import Array
 
 SCRIPTS = (
     "report/three.min.js",

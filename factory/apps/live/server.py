@@ -11,10 +11,11 @@ from secrets import token_urlsafe
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-from factory.api import Diagnostic, InputError, optional
+from factory.api import Diagnostic, InputError
 from factory.apps.live.commands import command_of
 from factory.apps.live.session import LiveEvent, LiveFrame, Session
 from factory.support.resource import Closing
+from factory.support.version import optional
 
 if TYPE_CHECKING:
     from websockets.http11 import Request, Response

@@ -8,8 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from factory.api import Project, usage_error
+from factory.api import Project
 from factory.apps.arms.cell_arm import CellArm
+from factory.support.errors import usage_error
 
 
 @dataclass(frozen=True, slots=True)

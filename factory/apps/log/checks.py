@@ -9,16 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Demand, value_of
+from factory.api import Demand, LayoutTable, RunVerdict, WorldName
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
 from factory.engine.record.subject import MonitorTable
-from factory.engine.record.verdict import check_kept_figures
-from factory.floor.layout.saved import LayoutTable
-from factory.support.bounds import WorldName
-from factory.support.settings import AUTO
-from factory.support.tables import LARGE
+from factory.support.tables import LARGE, value_of
 
 HEADER = "header"
 """The figure that is the digest of the header of a log."""
@@ -73,8 +69,8 @@ class LogHeader(ProjectTable):
             raise ValueError("wip must be a whole number from 1, or null, not 0")
         if not 0 <= self.jitter < 1:
             raise ValueError(f"jitter must be a number from 0 to less than 1, not {self.jitter}")
-        if self.settings.timestep == AUTO:
-            raise ValueError(f"settings.timestep must be a number, not {AUTO}")
+        if self.settings.timestep == "auto":
+            raise ValueError("settings.timestep must be a number, not auto")
         if not self.monitor.patience > 0:
             raise ValueError(f"monitor.patience must be above 0, not {self.monitor.patience}")
         if not all(0 <= place < len(self.places) for place in self.start):
@@ -178,6 +174,6 @@ def _check_ragged(name: str, arrays: Arrays, count: int) -> None:
 
 def check_figures(figures: Any) -> None:
     """Raises ValueError where the figures do not have the form of `kept_figures`, with HEADER."""
-    check_kept_figures(figures)
+    RunVerdict.check_kept_figures(figures)
     if not isinstance(figures.get(HEADER, ""), str):
         raise ValueError(f"its figure '{HEADER}' is not a text")

@@ -7,8 +7,7 @@ import stat
 from pathlib import Path
 from weakref import finalize
 
-from factory.api import read_bytes
-from factory.support.files import MIB
+from factory.support.files import MIB, read_bytes
 from factory.support.guard import reading
 
 AGAIN = "record it again: `factory run FILE.pag --log OUT`"

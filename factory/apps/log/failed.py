@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from factory.api import Failures, Undone, table_of, value_of
+from factory.api import Failures, Undone
 from factory.apps.log.blocks import Arrays
 from factory.engine.record.failures import Account
+from factory.support.tables import table_of, value_of
 
 LISTS = "found", "stood"
 """The lists of an account: a block of ticks has the entries that were added to them."""

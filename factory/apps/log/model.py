@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from factory.api import Diagnostic, InputError, mujoco
+from factory.api import Diagnostic, InputError
 from factory.apps.log.admission import admitted
 from factory.apps.log.content import AGAIN
 from factory.apps.log.reader import Log, Ragged
 from factory.engine.mjcf.loading import compiled
+from factory.support.engine import mujoco
 
 
 def model_of(log: Log) -> mujoco.MjModel:

@@ -17,21 +17,16 @@ from factory.api import (
     Diagnostic,
     Ground,
     InputError,
-    Position,
+    LayoutTable,
     Project,
     Settings,
-    misfit,
-    read_bytes,
     read_text,
-    table_of,
-    usage_error,
-    value_of,
 )
 from factory.apps.log.cell_table import cell_in
 from factory.apps.log.project_table import ProjectTable, project_of, project_table
-from factory.floor.layout.saved import LAID_FOR, LayoutTable
-from factory.support.files import MESH
-from factory.support.tables import MISFITS
+from factory.support.errors import Position, usage_error
+from factory.support.files import MESH, read_bytes
+from factory.support.tables import MISFITS, misfit, table_of, value_of
 
 PLAN_NAME, LAYOUT_NAME = "plan.json", "layout.json"
 
@@ -130,7 +125,9 @@ def _digest(
     """Digest of the inputs of a layout: text, templates and plan of a table, the content of the
     meshes of its PAG, settings, floor."""
     values = [table["pag"]["text"], table["templates"], table["plan"], table_of(floor)]
-    made = sha256(json.dumps([values, [getattr(settings, n) for n in LAID_FOR]]).encode())
+    made = sha256(
+        json.dumps([values, [getattr(settings, n) for n in LayoutTable.LAID_FOR]]).encode()
+    )
     for mesh in dict.fromkeys(filter(None, (part.parameter("mesh") for part in pag.parts()))):
         made.update(sha256(read_bytes(Path(pag.folder) / str(mesh), MESH)).digest())
     return made.hexdigest()

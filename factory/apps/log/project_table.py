@@ -22,24 +22,23 @@ from factory.api import (
     Factory,
     Ground,
     InputError,
+    LayoutTable,
     Plan,
     Project,
     Settings,
     Template,
+    all_templates,
     load_catalogue,
-    misfit,
-    table_of,
-    value_of,
+    read_pag,
+    read_template,
     write_pag,
+    write_template,
 )
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
-from factory.floor.layout.saved import LayoutTable
-from factory.pipeline import all_templates
-from factory.support.tables import MISFITS
+from factory.support.tables import MISFITS, misfit, table_of, value_of
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.lang import read_pag, read_template, write_template
 from factory.theory.nets.history import firings
 
 

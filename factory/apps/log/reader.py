@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import CutOff, Entry, Failures, InputError, misfit
+from factory.api import CutOff, Entry, Failures, InputError
 from factory.apps.log.blocks import (
     LENGTH,
     MAGIC,
@@ -40,6 +40,7 @@ from factory.apps.log.content import RECORD, Content, content_of
 from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone_in
 from factory.support.claim import is_claimed
 from factory.support.files import LOG, head_of
+from factory.support.tables import misfit
 from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]

@@ -16,19 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.api import (
-    Array,
     Diagnostic,
     Event,
     FactoryError,
     InputError,
+    LayoutTable,
     MonitorSubject,
     Observation,
     Project,
     Recordable,
     Recorder,
+    RunVerdict,
     State,
     Undone,
-    table_of,
 )
 from factory.apps.log.blocks import LENGTH, MAGIC, STATES, Arrays, bad_log, block, pack_rows
 from factory.apps.log.cell_table import cell_in
@@ -37,11 +37,10 @@ from factory.apps.log.content import RECORD, content_of
 from factory.apps.log.failed import Written
 from factory.apps.log.project_table import project_table
 from factory.apps.log.reader import digest_of, header_in
-from factory.engine.record.verdict import kept_figures
-from factory.floor.layout.saved import LayoutTable
+from factory.support.arrays import Array
 from factory.support.claim import claimed
 from factory.support.files import unwritten
-from factory.support.settings import AUTO
+from factory.support.tables import table_of
 from factory.support.version import release
 
 if TYPE_CHECKING:
@@ -221,7 +220,7 @@ class LogWriter(Recorder):
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.simulation.figures()) is not None:
             header, _ = header_in(content_of(self.path, RECORD))
-            kept = {**kept_figures(figures), HEADER: digest_of(header)}
+            kept = {**RunVerdict.kept_figures(figures), HEADER: digest_of(header)}
             texts["figures"] = json.dumps(kept)
         if (account := self.simulation.state().account) is not None:
             texts["failures"] = json.dumps(table_of(account.report()))
@@ -302,7 +301,7 @@ def _header(
         "units": simulation.request.units,
         "wip": simulation.request.wip,
         "chosen": {
-            "timestep": simulation.asked.settings.timestep == AUTO,
+            "timestep": simulation.asked.settings.timestep == "auto",
             "wip": simulation.asked.wip is None,
         },
         "distributed": simulation.request.distributed,

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from factory.api import Array, Factory, Index, names
+from factory.api import Factory, names
 from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames, chain_of
 from factory.floor.layout.chains import SoughtCurves
+from factory.support.arrays import Array, Index
 
 if TYPE_CHECKING:
-    from factory.api import mujoco
+    from factory.support.engine import mujoco
 
 PARK, FEED, GRIP, HOLD = range(4)
 
@@ -100,7 +101,7 @@ class Anatomy:
     def of(cls, m: Any, factory: Factory, bent: Bent) -> Anatomy:
         """The anatomy of a model of a factory, some of whose guidepaths are `bent`. Raises
         ValueError where the model is not of that factory."""
-        from factory.api import mujoco
+        from factory.support.engine import mujoco
 
         robots = {r.name: r.index for r in factory.robots}
         try:

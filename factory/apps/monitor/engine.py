@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from time import perf_counter
 
-from factory.api import MonitorSubject, Observation, Report, State, collector_paused
+from factory.api import MonitorSubject, Observation, Report, State
 from factory.apps.monitor.agreement import Recorded
 from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.monitor import KEPT, Monitor
+from factory.support.collector import collector_paused
 
 LOOK = 0.5
 """Interval of full observations of a monitor that does not observe every tick [s]; in between it

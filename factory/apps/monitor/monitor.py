@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from factory.api import Factory, MonitorSubject, Observation, Operation, Report, collector_paused
+from factory.api import Factory, MonitorSubject, Observation, Operation, Report
 from factory.apps.monitor.agreement import Recorded, disagreements
 from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.explanation import SeenFirings
@@ -17,6 +17,7 @@ from factory.apps.monitor.grips import Grips, misplaced
 from factory.apps.monitor.motion import AxisMotion, Lags, Straying
 from factory.apps.monitor.transfers import Transfers
 from factory.engine.record.findings import Violation
+from factory.support.collector import collector_paused
 
 MOST = 100
 """Number of violations that are kept, the first ones: a fault often causes others."""

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Index, Observation, Settings
+from factory.api import Observation, Settings
 from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.grips import MISSED
+from factory.support.arrays import Array, Index
 
 REST = 0.01
 """Speed below which robots hand over [m/s]."""

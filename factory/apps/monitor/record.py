@@ -19,7 +19,6 @@ from factory.api import (
     Observation,
     Report,
     RunVerdict,
-    value_of,
 )
 from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, project_of, settings_of
@@ -32,7 +31,7 @@ from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
 from factory.engine.record.subject import MonitorTable
-from factory.engine.record.verdict import judged
+from factory.support.tables import value_of
 from factory.theory.nets.replay import replay
 from factory.theory.plant.demand import Word
 
@@ -109,7 +108,7 @@ def verdict_on(
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)
-    verdict = judged(trouble, refines, figures, report, faults=faults)
+    verdict = RunVerdict.of(trouble, refines, figures, report, faults=faults)
     return verdict.caused_by(log.failures.unseen if log.failures else ())
 
 

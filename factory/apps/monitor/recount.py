@@ -14,12 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Index, MonitorSubject, Observation, Replica, mujoco, names
+from factory.api import MonitorSubject, Observation, Replica, names
 from factory.apps.log.reader import Log
 from factory.apps.monitor.anatomy import GRIP, HOLD, PARK, Anatomy
 from factory.engine.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
 from factory.engine.mjcf.pads import Pads, trunks
 from factory.engine.record.findings import Violation
+from factory.support.arrays import Array, Index
+from factory.support.engine import mujoco
 
 PRESSED = 1e-4
 """Largest depth of a part in the pad that holds it, or is about to [m]."""

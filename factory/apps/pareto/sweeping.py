@@ -17,14 +17,14 @@ from functools import cached_property
 from itertools import product
 from math import ceil, inf
 
-from factory.api import Allowance, FactoryError, Plan, Project
+from factory.api import FactoryError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.candidate import Candidate
 from factory.apps.few_robots.estimating import Estimate, Estimator
 from factory.apps.few_robots.parallel import Branches
 from factory.apps.few_robots.search import SINGLE, Search
 from factory.apps.pareto.front import Ended, FrontPoint, ParetoFront, candidates_front, undominated
-from factory.theory.problem.plan import THIRD
+from factory.support.allowance import Allowance
 
 WIDE = 2
 """Effort for a front, over that of a search for one factory."""
@@ -151,7 +151,7 @@ class FrontSweep:
         """The estimates of the forms of the best with one form changed."""
         best = [one.forms for share, one in candidates_front(self.estimates) if share <= 1]
         tried = {tuple(one.forms.values()) for one in self.estimates}
-        for label, form, forms in product(self.estimator.written.forms, (THIRD, 0, 1), best):
+        for label, form, forms in product(self.estimator.written.forms, (Plan.THIRD, 0, 1), best):
             changed = {**forms, label: form}
             key = tuple(changed.values())
             if key not in tried:

@@ -6,8 +6,8 @@ from collections.abc import Collection
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.planning.blocking import Blocking, closure
+from factory.support.arrays import Array
 
 LIKELY = 3
 """So many parts are tried as the base, the likeliest first."""

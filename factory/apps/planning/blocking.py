@@ -18,15 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from factory.api import Array, Indices
+from factory.api import Finder
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.standing import Feet
 from factory.floor.geometry.overlapping import Overlapping
-from factory.floor.mating.bodies import ConvexBodies, bodies
-from factory.floor.mating.mating import AMPLE
-from factory.floor.mating.meetings import Meeting, Meetings
-from factory.floor.mating.overlaps import Finder, Overlaps
-from factory.floor.mating.paths import TOLERANCE
+from factory.floor.mating.overlaps import Overlaps
+from factory.support.arrays import Array, Indices
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
 """Levels of blocking: none; the parts scrape, or stay drawn into each other; parts that were drawn
@@ -239,7 +236,8 @@ def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Block
     """The blocking graphs of a source's units. Almost linear in the number of bodies, unless very
     many lie behind one another. `watch` is called often, and may raise."""
     units = source.units()
-    finder, convex, unit = _bodies(source, watch)
+    finder, unit = _finder(source, watch)
+    convex = finder.bodies
     count = len(units)
     levels, depths = np.zeros((3, count, count), np.int8), np.zeros((3, count, count))
     for axis in AXES:
@@ -249,13 +247,13 @@ def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Block
     np.minimum.at(bounds[0], unit[convex.part], convex.low)
     np.maximum.at(bounds[1], unit[convex.part], convex.high)
     labels = tuple(label for label, _ in units)
-    touch = _touching(finder, convex, unit, count)
+    touch = _touching(finder, unit, count)
     near = touch | _within(finder, unit, count, NEAR)
     hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
     locks, pressed = levels >= LOCKED, np.zeros((count, count), bool)
     locked = locks.sum(axis=0)
     touch |= near & (locked + locked.T >= GUIDED)
-    drawn_in = overlaps.depths.finished > TOLERANCE
+    drawn_in = overlaps.drawn_in
     pressed[unit[overlaps.one[drawn_in]], unit[overlaps.other[drawn_in]]] = True
     graphs = Blocking(labels, levels, locks, touch, *bounds, depths, hidden)
     return replace(graphs, near=near, pressed=pressed | pressed.T)
@@ -263,38 +261,30 @@ def blocking(source: InPlace, watch: Callable[[], None] = lambda: None) -> Block
 
 def rooms(source: InPlace, axis: int) -> Array:
     """The least clearance (n, n) [m] between units while the first leaves along an axis past the
-    second: negative where they overlap, infinite where it exceeds AMPLE."""
-    finder, _, unit = _bodies(source)
+    second: negative where they overlap, infinite where it is ample."""
+    finder, unit = _finder(source)
     count = len(source.units())
     room = np.full((count, count), np.inf)
-    moving, standing, least = finder.rooms(axis, AMPLE)
+    moving, standing, least = finder.rooms(axis)
     one, other = unit[moving], unit[standing]
     for column, at in enumerate(((other, one), (one, other))):
         apart = one != other
         np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
-    return np.where(room >= AMPLE, np.inf, room)
+    return room
 
 
-def _bodies(
-    source: InPlace, watch: Callable[[], None] = lambda: None
-) -> tuple[Finder, ConvexBodies, Indices]:
-    """The convex bodies of all parts, unit by unit, and the unit of each part."""
-    units, labels = source.units(), tuple(source.product.solids)
+def _finder(source: InPlace, watch: Callable[[], None] = lambda: None) -> tuple[Finder, Indices]:
+    """The finder of all parts, unit by unit, and the unit of each part."""
+    units = source.units()
     unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
-    convex = bodies(source.product, labels)
-    every = Meeting("", (), 0, 0, 0, len(labels), either=True)
-    borders, levels = np.zeros(len(labels) - 1, np.int64), np.zeros(1, np.int64)
-    meetings = Meetings(labels, (every,), borders, levels)
-    return Finder(convex, meetings, True, watch), convex, unit
+    return Finder.at_once(source.product, watch), unit
 
 
 def _hidden(overlaps: Overlaps, unit: Indices, labels: Sequence[str]) -> tuple[Overlapping, ...]:
     """The parts of two units that overlap in the finished product according to hulls alone; any
     axis shows them."""
     finished = overlaps.depths.finished
-    drawn_in = (
-        overlaps.rough & (finished > TOLERANCE) & (unit[overlaps.one] != unit[overlaps.other])
-    )
+    drawn_in = overlaps.rough & overlaps.drawn_in & (unit[overlaps.one] != unit[overlaps.other])
     rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
     one, other = (array[rows].tolist() for array in (overlaps.one, overlaps.other))
     pairs = zip(one, other, finished[rows].tolist(), strict=True)
@@ -317,8 +307,9 @@ def _enter(overlaps: Overlaps, unit: Indices, levels: NDArray[np.int8], deep: Ar
         np.maximum.at(deep, at, depths.path[apart, column])
 
 
-def _touching(finder: Finder, convex: ConvexBodies, unit: Indices, count: int) -> NDArray[np.bool_]:
+def _touching(finder: Finder, unit: Indices, count: int) -> NDArray[np.bool_]:
     """Which units touch: those in contact, then those that connect components."""
+    convex = finder.bodies
     touch = np.eye(count, dtype=bool)
     gap, furthest = CONTACT, float((convex.high.max(axis=0) - convex.low.min(axis=0)).max())
     while count > 1 and gap < 2 * furthest:

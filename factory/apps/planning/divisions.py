@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array
 from factory.apps.planning.subsets import LEVEL_PRICES, Masks, Subsets
+from factory.support.arrays import Array
 
 Late = Callable[[], bool]
 """Tells whether a search must end."""

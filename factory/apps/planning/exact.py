@@ -23,9 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Pace
+from factory.api import Pace
 from factory.apps.planning.divisions import Batch, Divisions, Late, Levels, TooLate, never
 from factory.apps.planning.subsets import LEVEL_PRICES, UNDER, Masks, Subsets
+from factory.support.arrays import Array
 from factory.theory.plant.approaches import MARGIN
 
 STATION = 0.06

@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Indices, Product, Solid
+from factory.api import Product, Solid
 from factory.apps.planning.exploding import Explosion
 from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.source import surface
-from factory.film.ink import Pixels
-from factory.film.picture import Size
-from factory.film.reel import write_still
-from factory.film.smoothing import smooth
-from factory.film.video import VideoFile, check_output
 from factory.floor.geometry.overlap import drawn
-from factory.floor.geometry.sight import View, fit, towards
+from factory.support.arrays import Array, Indices
+from factory.support.pictures.ink import Pixels
+from factory.support.pictures.sight import View, fit, towards
+from factory.support.pictures.smoothing import smooth
+from factory.support.pictures.still import write_still
+from factory.support.pictures.video import Size, VideoFile, check_output
 
 FPS = 15.0
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import PAG, Array, Product
+from factory.api import PAG, Product
 from factory.floor.mating.findings import Matings
+from factory.support.arrays import Array
 from factory.theory.plant.approaches import Approach, Kind
 
 ROOM = 0.15

@@ -16,7 +16,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array
 from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking, closure
 from factory.apps.planning.cannot import Units
 from factory.apps.planning.divisions import Late, divisions
@@ -33,6 +32,7 @@ from factory.apps.planning.subsets import (
     subsets,
 )
 from factory.apps.planning.writing import leaves
+from factory.support.arrays import Array
 
 Sets = NDArray[np.bool_]
 

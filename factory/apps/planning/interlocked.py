@@ -8,15 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Indices
 from factory.apps.planning.cannot import Interlock
 from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.parts import InPlace
-from factory.film.ink import GROUND, INK, Colour, Ink, Pixels, fitted, width
-from factory.film.picture import Size
-from factory.film.reel import write_still
-from factory.film.video import check_output
-from factory.floor.geometry.sight import fit, towards
+from factory.support.arrays import Array, Indices
+from factory.support.pictures.ink import GROUND, INK, Colour, Ink, Pixels, fitted, width
+from factory.support.pictures.sight import fit, towards
+from factory.support.pictures.still import write_still
+from factory.support.pictures.video import Size, check_output
 
 SIZE: Size = (1280, 720)
 """Of the picture, without the names below it."""

@@ -9,7 +9,6 @@ from typing import Union
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.apps.planning.cannot import Direction, Units
 from factory.apps.planning.exact import RELAY, Expected, Tree
@@ -25,6 +24,7 @@ from factory.apps.planning.subsets import (
     UNHELD,
     Stance,
 )
+from factory.support.arrays import Array
 
 PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
 """The price of a join by its level of blocking."""

@@ -11,7 +11,6 @@ from time import perf_counter
 import numpy as np
 
 from factory.api import (
-    Allowance,
     FactoryError,
     Ground,
     InputError,
@@ -23,6 +22,8 @@ from factory.api import (
     listing,
     load_catalogue,
     pace,
+    product_geometry,
+    read_pag,
 )
 from factory.apps.few_robots.sharing import with_lines
 from factory.apps.planning.bases import EQUAL
@@ -34,8 +35,7 @@ from factory.apps.planning.searching import Aim
 from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
-from factory.floor.geometry.product import product_geometry
-from factory.theory.lang.pag_reader import read_pag
+from factory.support.allowance import Allowance
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

@@ -6,13 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Array, Indices, Replica, mujoco
+from factory.api import Replica
 from factory.engine.mjcf.model import SKELETON
 from factory.engine.mjcf.scene import FILL, KEY
 from factory.film.painter import Renderer
-from factory.film.picture import Size
-from factory.floor.geometry.sight import Framing
-from factory.support import gl
+from factory.support.arrays import Array, Indices
+from factory.support.engine import mujoco
+from factory.support.gl import probe
+from factory.support.pictures.sight import Framing
+from factory.support.pictures.video import Size
 from factory.support.resource import Closing
 
 FLOOR = 20.0
@@ -63,7 +65,7 @@ class LooseParts(Closing):
         extent: float,
         size: Size,
     ) -> None:
-        gl.probe()
+        probe()
         model = loose_parts(surfaces, colours, floor, extent)
         model.vis.global_.offwidth, model.vis.global_.offheight = size
         model.vis.quality.offsamples = 0

@@ -11,22 +11,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import (
-    PAG,
-    Array,
-    Assembly,
-    Diagnostic,
-    Indices,
-    InputError,
-    Mesh,
-    Product,
-    Solid,
-    listing,
-)
-from factory.floor.geometry.decomposition import FULL
-from factory.floor.geometry.meshes import is_closed
+from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid, listing
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
+from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import is_closed
 from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
@@ -41,7 +30,7 @@ def hull_stands(mesh: Mesh | None) -> bool:
     """Whether a closed mesh that is notably smaller than its hull is represented by the hull."""
     if mesh is None or mesh.pieces or not is_closed(mesh.faces):
         return False
-    return 0 < mesh.share < FULL
+    return 0 < mesh.share < mesh.FULL
 
 
 def refuse_hidden(source: InPlace, pairs: Sequence[Overlapping]) -> None:

@@ -10,17 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import (
-    Allowance,
-    Array,
-    Diagnostic,
-    InputError,
-    Pace,
-    Project,
-    Settings,
-    Template,
-    did_you_mean,
-)
+from factory.api import Diagnostic, InputError, Pace, Project, Settings, Template, all_templates
 from factory.apps.planning.blocking import (
     CLASHES,
     DEEPER,
@@ -55,7 +45,9 @@ from factory.apps.planning.standing import feet
 from factory.apps.planning.subsets import MOST, stances
 from factory.apps.planning.writing import Tree, leaves, screws_in
 from factory.floor.geometry.overlapping import Overlapping
-from factory.pipeline import all_templates
+from factory.support.allowance import Allowance
+from factory.support.arrays import Array
+from factory.support.errors import did_you_mean
 
 DECOMPOSING = "decomposing parts into convex bodies"
 """The name of the stage after a tree is found: layouts and runs need these bodies, ways do not."""

@@ -11,13 +11,14 @@ from typing import Literal
 
 import numpy as np
 
-from factory.api import Allowance, Array
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.divisions import Divisions, KnownDivisions, Late, TooLate, divisions
 from factory.apps.planning.exact import Best, Expected, Tables, TreeTask, tables
 from factory.apps.planning.growing import bettered, divided
 from factory.apps.planning.judging import Judged, Site
 from factory.apps.planning.subsets import MOST, ROOT_AXIS, Stance, Subsets, stances, subsets
+from factory.support.allowance import Allowance
+from factory.support.arrays import Array
 
 Aim = Literal["cycle", "robots", "floor"]
 """The objective of planning."""

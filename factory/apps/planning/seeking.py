@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from factory.api import PAG, Allowance, Array, Template
+from factory.api import PAG, Template, expand, product_geometry
 from factory.apps.planning.bases import EQUAL, likely, worth
 from factory.apps.planning.blocking import NO_RELATION, Blocking, Unheld
 from factory.apps.planning.divisions import KnownDivisions
@@ -26,9 +26,9 @@ from factory.apps.planning.subsets import BLOCKED, MOST, ROOT_AXIS, Stance
 from factory.apps.planning.threads import threads
 from factory.apps.planning.turning import only
 from factory.apps.planning.writing import leaves, planned_product
-from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
-from factory.theory.compiler.expanding import expand
+from factory.support.allowance import Allowance
+from factory.support.arrays import Array
 
 DWELL = 1.0
 """The time that a driver turns a screw [s], as its template states."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.planning.names import Says, says
 from factory.apps.planning.parts import PlacedPart
 from factory.floor.geometry.overlap import drawn
+from factory.support.arrays import Array
 
 HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16
 """Proportions of a bolt. Its head is farther from the axis than HEAD times the largest radius; its

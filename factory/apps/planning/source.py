@@ -11,18 +11,14 @@ import numpy as np
 
 from factory.api import (
     PAG,
-    Array,
     Assembly,
     Diagnostic,
-    Indices,
     InputError,
     Product,
     Solid,
     Template,
-    collector_paused,
-    did_you_mean,
     load_pag,
-    rotation,
+    product_geometry,
 )
 from factory.apps.importing import Imported, Options, import_product
 from factory.apps.importing.alike import alike
@@ -35,13 +31,16 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.alike import shape_of
 from factory.floor.geometry.decomposition import can_decompose
-from factory.floor.geometry.mesh_file import ANEW
-from factory.floor.geometry.meshes import hull_mesh
 from factory.floor.geometry.overlap import drawn
-from factory.floor.geometry.product import product_geometry
-from factory.theory.lang.source import quoted
+from factory.support.arrays import Array, Indices
+from factory.support.collector import collector_paused
+from factory.support.errors import did_you_mean
+from factory.support.meshes.alike import shape_of
+from factory.support.meshes.mesh_file import ANEW
+from factory.support.meshes.triangles import convex_hull
+from factory.support.rotations import rotation
+from factory.support.texts import quoted
 from factory.theory.problem.pag import SHAPES
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
@@ -243,7 +242,6 @@ def surface(solid: Solid) -> tuple[Array, Indices]:
     """The surface of a solid in place: vertices (n, 3) [m] and faces (m, 3); for a round solid, the
     polytope around it."""
     if solid.mesh is None:
-        mesh = hull_mesh(solid.label, solid.pieces[0])
-        return mesh.vertices, mesh.faces
+        return convex_hull(solid.pieces[0])
     turn = rotation(solid.quaternion)
     return solid.mesh.vertices @ turn.T + solid.position, np.asarray(solid.mesh.faces)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array
 from factory.apps.planning.parts import PlacedPart
+from factory.support.arrays import Array
 
 LEVEL = 5e-4
 """The height above the lowest point [m], or the share LOW of the total height, up to which points

@@ -11,8 +11,8 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array
 from factory.apps.planning.blocking import AXES, CLASHES, DEEPER, LOCKED, Blocking
+from factory.support.arrays import Array
 
 ROOT_AXIS = 1
 """The axis of the floor along which the inputs of the finished product come: y."""

@@ -8,9 +8,9 @@ from itertools import count
 
 import numpy as np
 
-from factory.api import Array
 from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.floor.geometry.overlap import drawn
+from factory.support.arrays import Array
 
 LONGEST = 40
 """The most letters of a name of two parts."""

@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from factory.api import Array
+from factory.api import product_geometry
 from factory.apps.planning.parts import InPlace, PlacedPart
 from factory.apps.planning.source import surface
 from factory.apps.planning.writing import planned_product
-from factory.floor.geometry.meshes import normals_of
-from factory.floor.geometry.product import product_geometry
+from factory.support.arrays import Array
+from factory.support.meshes.triangles import normals_of
 
 NEAR = 1e-3
 """Faces inside the box of another part, enlarged by this [m], may touch that part."""

@@ -11,16 +11,15 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Array, Assembly, Template, write_pag
+from factory.api import PAG, Assembly, Template, expand, product_geometry, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.titles import Titles
 from factory.floor.geometry.overlapping import overlaps_of
-from factory.floor.geometry.product import product_geometry
 from factory.floor.mating.mating import matings
-from factory.theory.compiler.expanding import expand
-from factory.theory.problem.pag import AllowedOverlap, most_allowed
+from factory.support.arrays import Array
+from factory.theory.problem.pag import AllowedOverlap
 
 Unit = TypeVar("Unit", bound=str | int)
 
@@ -143,7 +142,7 @@ def _meant(
     deep: dict[tuple[str, str], float] = {}
     for pair in overlaps_of(product).pairs:
         is_thread = (pair.one in threaded) != (pair.other in threaded)
-        needed = pair.depth > most_allowed(pag.allowed, pair.one, pair.other)
+        needed = pair.depth > pag.most_allowed(pair.one, pair.other)
         if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):
             deep[pair.one, pair.other] = pair.depth
     judged = matings(expand(pag, templates), product).all if allow else ()

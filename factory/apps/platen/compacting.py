@@ -16,12 +16,11 @@ import numpy as np
 from factory.api import Layout, Pace
 from factory.apps.platen.placing import Floor, Placing
 from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.dimensions import up
-from factory.floor.layout.durations import cycle_of
+from factory.floor.layout.branches import branch_of
 from factory.floor.layout.feeding import cleared
-from factory.floor.layout.layout import branch_of
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.way import Bend, rounding_for
+from factory.support.decimals import up
 
 TRIES, EFFORT = 220, 120_000
 """Changes that are tried for each guidepath, and at most robots times changes: each takes a time
@@ -90,7 +89,7 @@ class _Search:
 
     def __init__(self, layout: Layout, pace: Pace, seed: int) -> None:
         self.layout, self.pace, self.ground = layout, pace, Floor(layout)
-        self.most = SLOWER * cycle_of(layout, pace)
+        self.most = SLOWER * pace.cycle_of(layout)
         full = rounding_for(pace.speed, pace.acceleration)
         self.roundings = [full, *(small for small in SHARPER if small < full)]
         self.rng = np.random.default_rng(seed)
@@ -120,7 +119,7 @@ class _Search:
             if self.worth(there, size) + press * there.deep.sum() > limit:
                 continue
             made = bent(self.layout, there.detours)
-            if cycle_of(made, self.pace) > self.most:
+            if self.pace.cycle_of(made) > self.most:
                 continue
             here = there
             if not here.deep.any() and here.area < least - 1e-4:

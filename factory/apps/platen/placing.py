@@ -12,12 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Array, Index, Layout, Point2, Truth
+from factory.api import Layout, carriers
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.certificate import STATIONS, Region
 from factory.floor.layout.crowding import Crowding
-from factory.floor.layout.layout import carriers
 from factory.floor.layout.sweeps import piles, regions_of
+from factory.support.arrays import Array, Index, Truth
+from factory.support.boxes import Point2
 
 
 @dataclass(frozen=True, eq=False, slots=True)

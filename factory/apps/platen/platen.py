@@ -5,8 +5,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from factory.api import Ground, Hands, Layout, Pace, Point2, RunError, Settings, certified
+from factory.api import Ground, Hands, Layout, Pace, RunError, Settings, certified
 from factory.apps.platen.compacting import compacted
+from factory.support.boxes import Point2
 
 
 def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = None) -> Layout:

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Layout, Mode
+from factory.api import Layout, Mode
 from factory.floor.layout.coordinating import Coordinated
 from factory.floor.layout.exclusions import awaited_positions
-from factory.floor.layout.presence import Span
 from factory.floor.layout.staying import Staying, Sweep
+from factory.support.arrays import Array
 from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3
@@ -95,7 +95,7 @@ class Corridors:
             yield from stretch.sweeps
 
 
-def _outside(span: Span, at: float) -> float:
+def _outside(span: tuple[float, float], at: float) -> float:
     """How far a place is outside a span [m]."""
     return max(min(span) - at, at - max(span), 0.0)
 
@@ -105,7 +105,7 @@ def _off(sweep: Sweep, at: Array) -> float:
     return max(_outside(span, there) for span, there in zip(sweep, at.tolist(), strict=False))
 
 
-def _beside(sweeps: Sequence[Sweep], which: int, other: float) -> list[Span]:
+def _beside(sweeps: Sequence[Sweep], which: int, other: float) -> list[tuple[float, float]]:
     """The spans of one of two axes, 0 or 1, in the sweeps in which the other may be where it is,
     or in those that are nearest to that."""
     off = [_outside(sweep[1 - which], other) for sweep in sweeps]

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import Array, Event, Factory, Limits, Operation, Settings
+from factory.api import Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
 from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.timing.distributed import Scan
+from factory.support.arrays import Array
 
 if TYPE_CHECKING:
     from factory.api import Simulation

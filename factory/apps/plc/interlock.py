@@ -8,11 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from factory.api import NOPART, Event, Layout, Mode, Operation, Truth, World
+from factory.api import NOPART, Event, Layout, Mode, Operation, World
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.signals import Commands, GripStates, Refusal, Refusals
 from factory.engine.simulation.ordering import Ordering
 from factory.floor.layout.coordinating import Coordinated
+from factory.support.arrays import Truth
 from factory.theory.control.mode import REST
 from factory.theory.nets.threaded import Threads
 

@@ -17,12 +17,13 @@ from time import monotonic, sleep
 from types import TracebackType
 from typing import Any
 
-from factory.api import Diagnostic, Factory, InputError, Simulation, optional
+from factory.api import Diagnostic, Factory, InputError, Simulation
 from factory.apps.live.server import check_host
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.opcua_server import OpcuaServer
 from factory.apps.plc.signals import Commands, Refusal, Sensed
 from factory.apps.plc.written import WrittenCommands
+from factory.support.version import optional
 
 SPACE = "urn:klavins-factory:plant"
 """The namespace of its nodes."""

@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from factory.api import NOPART, Array, Limits, Operation, World
+from factory.api import NOPART, Limits, Operation, World
+from factory.support.arrays import Array
 from factory.theory.control.governor import towards
 
 NOBODY = -1

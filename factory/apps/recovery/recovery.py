@@ -19,7 +19,6 @@ from factory.api import (
     Operation,
     Simulation,
     Undone,
-    table_of,
 )
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import KINDS, Deviation
@@ -30,6 +29,7 @@ from factory.apps.recovery.responding import RecoveryPolicy
 from factory.apps.recovery.standing import patience
 from factory.engine.record.failures import Stood
 from factory.engine.simulation.supervisor import Supervisor
+from factory.support.tables import table_of
 from factory.theory.problem.template import Failure
 
 IN_VAIN = 2.0

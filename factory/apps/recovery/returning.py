@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Layout, Marking, Mode, Operation
+from factory.api import Layout, Marking, Mode, Operation, start_positions
 from factory.engine.simulation.supervisor import Supervisor
 from factory.floor.layout.feeding import passing
-from factory.floor.layout.starting import start_positions
+from factory.support.arrays import Array
 
 Goal = tuple[int, float]
 """An axis and where it goes [m]."""

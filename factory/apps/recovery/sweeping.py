@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Array, Index, Layout
+from factory.api import Layout, regions
 from factory.floor.layout.sweeping import APART
-from factory.floor.layout.sweeps import piles, regions
+from factory.support.arrays import Array, Index
 from factory.theory.control.mode import ROUNDING
 
 
@@ -23,7 +23,7 @@ class SweptFloor:
     @classmethod
     def of(cls, layout: Layout) -> SweptFloor:
         """The swept floor of a layout."""
-        occupied = regions(layout, piles(layout.factory, layout.product))
+        occupied = regions(layout)
         robots = np.array([region.robot for region in occupied], np.intp)
         return cls(np.array([region.box for region in occupied]), robots)
 

@@ -15,15 +15,17 @@ Theorem 5 (return). m_0 + C n' >= 0 is reachable from m_0, as it is in any live 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 
 from factory.api import GearNet, MarkedNet, Marking, marked
-from factory.theory.nets.undone import Joins
 
 
 def undo(
-    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
+    net: GearNet | MarkedNet,
+    fired: Sequence[int],
+    asked: Iterable[int],
+    joins: Mapping[int, tuple[int, ...]],
 ) -> tuple[int, ...]:
     """n': how often each transition still has fired, where each that is `asked` for is undone as
     often as it stands there, or oftener.
@@ -54,7 +56,7 @@ def marking_after(net: GearNet, fired: Sequence[int]) -> Marking:
 
 
 def _greatest(
-    net: MarkedNet, fired: Sequence[int], asked: Counter[int], joins: Joins
+    net: MarkedNet, fired: Sequence[int], asked: Counter[int], joins: Mapping[int, tuple[int, ...]]
 ) -> tuple[int, ...]:
     """The greatest counts that meet the conditions. Each is settled when it comes off the heap,
     since no condition bounds a count by less than another."""
@@ -71,7 +73,7 @@ def _greatest(
         count, event = heappop(heap)
         if count > counts[event]:
             continue
-        bounds = [(right[p], count + net.tokens[p]) for p in postset[event]]
+        bounds: list[tuple[int, int]] = [(right[p], count + net.tokens[p]) for p in postset[event]]
         undone = fired[event] - count
         bounds += [(made, fired[made] - undone) for made in joins.get(event, ())]
         for other, bound in bounds:

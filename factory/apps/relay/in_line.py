@@ -12,15 +12,14 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout
+from factory.api import Factory, Hand, Layout, carriers
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.kinds import BELOW
 from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import Places, centre_of
-from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.hands.tips import STRONG
-from factory.floor.layout.layout import carriers
+from factory.support.boxes import Point2
 from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 InLine = tuple[tuple[Hand | None, ...], set[int]]
@@ -139,7 +138,7 @@ class _Choice:
         line = min(max(middle, under - room), under + room)
         return Lane(path.heading, toward, line, side * way)
 
-    def _below(self, robot: int, frames: Sequence[tuple[Way, Way]], most: float) -> Hand:
+    def _below(self, robot: int, frames: Sequence[tuple[Point2, Point2]], most: float) -> Hand:
         """The best hand from below of a robot, using at most a given share of its strength; of the
         kind `none` if there is none."""
         label = held(self.holding.factory, robot)

@@ -7,15 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Array, Factory, Hand, Layout, Operation, Truth
-from factory.floor.layout.dimensions import FINGER, Clearance
+from factory.api import Clearance, Factory, Hand, Layout, Operation
+from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
 from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
 from factory.floor.layout.hands.reach import widths
-from factory.floor.layout.hands.surfaces import Way, swept
+from factory.floor.layout.hands.surfaces import swept
+from factory.support.arrays import Array, Truth
+from factory.support.boxes import Point2
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +26,8 @@ class Lane:
     carrier at the end of the line), the `line` across its heading in the frame of the product [m]
     to one `side` of which (+1, -1 along the axis) its lane is and it holds."""
 
-    heading: Way
-    toward: Way
+    heading: Point2
+    toward: Point2
     line: float
     side: int
 
@@ -83,12 +85,12 @@ class HandsApartInLanes(HandsApart):
         self,
         holding: HoldingInLanes,
         lanes: Mapping[int, Lane],
-        hand_of: Callable[[int, Way], Hand],
+        hand_of: Callable[[int, Point2], Hand],
     ) -> None:
         super().__init__(holding, hand_of)
         self.lanes, self.kept = lanes, dict[int, Hand]()
 
-    def own_side(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Truth:
+    def own_side(self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2) -> Truth:
         if robot in self.kept:
             kept, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
@@ -103,13 +105,13 @@ class HandsApartInLanes(HandsApart):
             return free
         return free & super().own_side(robot, kind, places, u, t)
 
-    def crossing(self, robot: int, places: Places, u: Way, t: Way) -> Array:
+    def crossing(self, robot: int, places: Places, u: Point2, t: Point2) -> Array:
         if self.holding.gives(robot):
             return np.zeros(len(places))
         return super().crossing(robot, places, u, t)
 
     def carriers_hand(
-        self, robot: int, kind: HandKind, places: Places, u: Way, t: Way
+        self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2
     ) -> Iterator[Swept]:
         if not self.holding.gives(robot):
             yield from super().carriers_hand(robot, kind, places, u, t)
@@ -124,14 +126,14 @@ class InTheWayInLanes(InTheWay):
     def __init__(
         self, holding: HoldingInLanes, lanes: Mapping[int, Lane], settled: Sequence[Hand | None]
     ) -> None:
-        def hand_of(robot: int, _: Way) -> Hand:
+        def hand_of(robot: int, _: Point2) -> Hand:
             return settled[robot] or NOTHING
 
         super().__init__(holding, hand_of)
         self.apart = HandsApartInLanes(holding, lanes, hand_of)
 
     def possible(
-        self, robot: int, label: str, kind: HandKind, frames: Sequence[tuple[Way, Way]]
+        self, robot: int, label: str, kind: HandKind, frames: Sequence[tuple[Point2, Point2]]
     ) -> bool:
         """Always true: a lane has two ends."""
         return True
@@ -142,22 +144,22 @@ class InTheWayInLanes(InTheWay):
         label: str,
         kind: HandKind,
         places: Places,
-        frames: Sequence[tuple[Way, Way]],
+        frames: Sequence[tuple[Point2, Point2]],
     ) -> tuple[dict[str, Truth], Truth]:
         """Not cached, since lanes and settled hands change."""
         return self._looked_at(robot, label, kind, places, frames)
 
     def _passing(
-        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Point2, t: Point2
     ) -> Passed:
         return self._looked_past(robot, label, kind, places, u, t)
 
-    def _going_on(self, robot: int, kind: HandKind, places: Places, u: Way, t: Way) -> Array:
+    def _going_on(self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2) -> Array:
         if self.holding.gives(robot):
             return np.zeros(len(places))
         return super()._going_on(robot, kind, places, u, t)
 
-    def _leaving(self, robot: int, kind: HandKind, places: Places, u: Way) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: HandKind, places: Places, u: Point2) -> Iterator[Swept]:
         """Also the sweep of a hand as it comes to take over, from ahead."""
         low, high = self.reach(kind, places, u)
         if self.holding.takes(robot):
@@ -170,7 +172,7 @@ class InTheWayInLanes(InTheWay):
             yield from super()._leaving(robot, kind, places, u)
 
     def coming(
-        self, robot: int, label: str, kind: HandKind, places: Places, u: Way, t: Way
+        self, robot: int, label: str, kind: HandKind, places: Places, u: Point2, t: Point2
     ) -> Iterator[Swept]:
         if not self.holding.takes(robot):
             yield from super().coming(robot, label, kind, places, u, t)

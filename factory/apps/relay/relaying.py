@@ -12,26 +12,25 @@ from dataclasses import dataclass, replace
 
 from factory.api import (
     NOPART,
+    Clearance,
     Ground,
     Hands,
     Layout,
     Pace,
-    Point2,
     Robot,
     Settings,
+    all_templates,
     certified,
     certify,
-    collector_paused,
     load_catalogue,
     pace,
 )
 from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
-from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.durations import cycle_of, gear_times
 from factory.floor.layout.optimising import optimised
 from factory.floor.layout.outfeed import away
-from factory.pipeline import all_templates
+from factory.support.boxes import Point2
+from factory.support.collector import collector_paused
 
 WITHIN = 1.05
 """Where no cycle time is asked for: that of the most relays there can be, times this."""
@@ -155,11 +154,11 @@ class _Search:
 
     def seconds(self, layout: Layout) -> float:
         """The cycle time [s]."""
-        return max(cycle_of(layout, self.pace), *self._times(layout))
+        return max(self.pace.cycle_of(layout), *self._times(layout))
 
     def _times(self, layout: Layout) -> list[float]:
         """Time of each robot's gear [s]; for the output robot at least that of the outfeed."""
-        seconds = gear_times(layout, self.pace)
+        seconds = self.pace.gear_times(layout)
         dropoff = layout.factory.dropoff.index
         way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
         outfeed = self.pace.rest(way) + self.pace.lost + away(layout, self.settings)

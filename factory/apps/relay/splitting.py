@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from factory.api import (
     NOPART,
     Catalogue,
+    Clearance,
     Factory,
     Guidepath,
     Layout,
@@ -20,7 +21,6 @@ from factory.api import (
 )
 from factory.apps.relay.in_line import InLine, hands_in_line
 from factory.apps.relay.ways import Way
-from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.visits import visits_of
 from factory.theory.compiler.expanding import RELAY, relay_label
 from factory.theory.compiler.relays import with_relays

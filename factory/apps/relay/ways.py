@@ -16,7 +16,7 @@ from itertools import accumulate, pairwise
 from math import floor, inf
 
 from factory.api import NOPART, Layout
-from factory.floor.layout.dimensions import up
+from factory.support.decimals import up
 from factory.theory.problem.robot_bodies import MAST
 
 

@@ -7,16 +7,11 @@ from html import escape
 
 import numpy as np
 
-from factory.api import Operation, Product
+from factory.api import Finder, Node, Operation, Product
 from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
-from factory.floor.mating.bodies import bodies
-from factory.floor.mating.mating import AMPLE, UPRIGHT
-from factory.floor.mating.meetings import Meeting, meetings
-from factory.floor.mating.overlaps import Finder
-from factory.floor.mating.paths import SIGNS
-from factory.theory.compiler.expanding import Node, nodes_of
-from factory.theory.plant.approaches import Approach, Pair
+from factory.theory.compiler.expanding import nodes_of
+from factory.theory.plant.approaches import Approach
 
 COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 
@@ -89,14 +84,14 @@ def _room(room: float | None) -> str:
     if room is None:
         return "–"
     if room == float("inf"):
-        return f"more than {1e3 * AMPLE:g} mm"
+        return f"more than {1e3 * Finder.AMPLE:g} mm"
     millimetres = round(1e3 * room, 2)
     if millimetres >= 0:
         return f"{abs(millimetres):.2f} mm"
     return f"overlap of {-millimetres:.2f} mm as drawn"
 
 
-def _left_out(pairs: set[Pair]) -> str:
+def _left_out(pairs: set[tuple[str, str]]) -> str:
     """The number of pairs, and a list."""
     if not pairs:
         return "none"
@@ -111,34 +106,30 @@ def rooms(
 ) -> Mapping[str, float]:
     """The least room [m] between the inputs of each operation on the way that was chosen for it
     (from all of its `sides`), by its label: less than 0 where parts overlap, infinite where it is
-    more than AMPLE. But for the last millimetre: finished parts may touch."""
-    met = meetings(nodes)
-    ways = [_way(meeting, chosen.get(meeting.label)) for meeting in met.all]
+    ample. But for the last millimetre: finished parts may touch."""
+    finder = Finder.of(product, nodes)
+    met = finder.meetings
+    ways = [_way(meeting.inputs[-1], chosen.get(meeting.label)) for meeting in met.all]
     least = np.full(len(met.all), np.inf)
-    if not met.all:
-        return {}
-    finder = Finder(bodies(product, met.parts), met)
     for axis in range(3):
         wanted = np.array([way == axis for way, _ in ways])
         if not wanted.any():
             continue
-        other, one, room = finder.rooms(axis, AMPLE)
+        other, one, room = finder.rooms(axis)
         meeting = met.of(one, other)
         rows = np.flatnonzero(wanted[meeting] & (other >= met.splits[meeting]))
         sides = np.array([sides for _, sides in ways])[meeting[rows]]
         np.minimum.at(least, meeting[rows], np.where(sides, room[rows], np.inf).min(axis=1))
-    least[least >= AMPLE] = np.inf
     labels = [meeting.label for meeting in met.all]
     return {label: float(r) for label, r in zip(labels, least, strict=True) if label in chosen}
 
 
-def _way(meeting: Meeting, approach: Approach | None) -> tuple[int, tuple[bool, bool]]:
-    """The axis, -1 for none, and the sides from which the last input comes. A lowered input comes
+def _way(last: str, approach: Approach | None) -> tuple[int, tuple[bool, bool]]:
+    """The axis, -1 for none, and the sides from which the `last` input comes. A lowered input comes
     from above; if that is another input, the last one comes from below."""
     if approach is None:
         return -1, (False, False)
     if approach.kind == "lower":
-        last = approach.lowered == meeting.inputs[-1]
-        return UPRIGHT, (not last, last)
-    low, high = (sign in approach.sides for sign in SIGNS)
-    return approach.axis, (low, high)
+        above = approach.lowered == last
+        return Finder.UPRIGHT, (not above, above)
+    return approach.axis, (-1 in approach.sides, +1 in approach.sides)

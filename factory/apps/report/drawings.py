@@ -9,10 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Array, Factory, Geoms, Operation, marked, names, rotation
+from factory.api import Factory, Geoms, Operation, marked, names
 from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
+from factory.support.arrays import Array
+from factory.support.rotations import rotation
 
 Link = dict[str, list[int]]
 """Numbers of `robots`, `labels`, `transitions`, `places` and `operations`; `solids` are the labels

@@ -10,8 +10,7 @@ from typing import Any
 from factory.api import Failing, Failures
 from factory.apps.drawing.tables import table
 from factory.apps.report.recording import Recording
-from factory.engine.record.failures import Death, deaths
-from factory.theory.lang.source import counted
+from factory.support.texts import counted
 
 LEGEND = (
     "Robots over time: undone operations are hatched; in a band a robot stands still, in a dark one"
@@ -49,17 +48,19 @@ def failures_data(recording: Recording) -> dict[str, Any]:
             [after, round(undone.t, 4), [net[name] for name in undone.transitions]]
             for after, undone in log.undone
         ],
-        "dead": [_dead(robots[one.robot], one) for one in deaths(log.failures.found)],
+        "dead": [
+            [robots[one.robot], round(one.start, 4), *_until(one.end, one.then)]
+            for one in log.failures.deaths
+        ],
         "stood": [
             [round(t, 4), [robots[name] for name in names]] for t, names in log.failures.stood
         ],
     }
 
 
-def _dead(robot: int, death: Death) -> list[Any]:
-    """A death, as in `failures_data`."""
-    start, end = round(death.start, 4), round(death.end, 4) if isfinite(death.end) else None
-    return [robot, start, end, f", then {death.then}" if end is not None else ""]
+def _until(end: float, then: str) -> tuple[float | None, str]:
+    """The end of a death, as in `failures_data`, and the situation after it."""
+    return (round(end, 4), f", then {then}") if isfinite(end) else (None, "")
 
 
 def _summary(failures: Failures) -> str:

@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Event, Timing, Undone, names
+from factory.api import Event, RunVerdict, Timing, Undone, names
 from factory.apps.analyze.measured import conditions, dropoff_times, operation_times
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.monitor.recount import worst
 from factory.apps.report.recording import Recording
-from factory.engine.record.verdict import MEASURED
 from factory.engine.simulation.run import busy_times, mean_interval
-from factory.theory.plant.approaches import Pair
 
 
 def fidelity(recording: Recording) -> dict[str, float | None]:
@@ -25,12 +23,12 @@ def fidelity(recording: Recording) -> dict[str, float | None]:
         figures = worst(figures, monitor.figures)
     return {
         "monitor_violations": None if monitor is None else float(len(monitor.violations)),
-        **{key: figures.get(key) for key in MEASURED},
+        **{key: figures.get(key) for key in RunVerdict.MEASURED},
         "tracking_error_max_mm": _tracking(recording),
     }
 
 
-def excluded(recording: Recording) -> tuple[Pair, ...]:
+def excluded(recording: Recording) -> tuple[tuple[str, str], ...]:
     """The pairs of parts that are excluded from contact in the recorded model."""
     m = recording.motion.m
     pairs = (names.excluded(m.exclude(i).name) for i in range(m.nexclude))

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from factory.api import (
-    Array,
     Diagnostic,
     Factory,
     InputError,
@@ -21,7 +20,6 @@ from factory.api import (
     Report,
     RunError,
     RunVerdict,
-    misfit,
 )
 from factory.apps.analyze.measured import conditions
 from factory.apps.exports.motion import BodyMotion, motion_of
@@ -30,6 +28,8 @@ from factory.apps.log.project_table import factory_of, project_of
 from factory.apps.monitor.record import verdict_on, watch_log
 from factory.apps.report.scene import DrawnFactory, drawn, stations
 from factory.apps.resume.remade import forged, model_faults
+from factory.support.arrays import Array
+from factory.support.tables import misfit
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Array, Factory, Geoms, Operation, Replica, mujoco, names, rotation
+from factory.api import Factory, Geoms, Operation, Replica, names
 from factory.apps.drawing.canvas import hexadecimal
 from factory.apps.exports.geoms import triangles
 from factory.film.dress import dressed
-from factory.floor.geometry.pieces import joined
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
+from factory.support.meshes.triangles import joined
+from factory.support.rotations import rotation
 
 VIEW = (-0.62, -1.0, 0.78)
 """Where the camera stands, seen from the factory."""

@@ -19,10 +19,9 @@ from factory.api import (
     Layout,
     MonitorSubject,
     RunRequest,
+    RunVerdict,
     Simulation,
     State,
-    misfit,
-    value_of,
 )
 from factory.apps.log import Log
 from factory.apps.log.checks import HEADER
@@ -30,7 +29,7 @@ from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
 from factory.engine.mjcf.reservations import reservations_of
-from factory.engine.record.verdict import FAULTS, RESERVATIONS
+from factory.support.tables import misfit, value_of
 
 TAG = re.compile(r"<[^>]+>")
 
@@ -135,7 +134,7 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
     does not say of its model."""
     assert made.model is not None
     kept = log.figures or {}
-    said = [tuple(fault) for fault in kept.get(FAULTS, [])]
+    said = [tuple(fault) for fault in kept.get(RunVerdict.FAULTS, [])]
     faults = [f for f in made.model.overlaps if (f.code, f.message) not in said]
     if log.figures is None:
         return faults
@@ -147,7 +146,7 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
         for code, words in said
         if code in OF_MODEL and (code, words) not in right
     ]
-    if (left := kept.get(RESERVATIONS, [])) != doubts:
+    if (left := kept.get(RunVerdict.RESERVATIONS, [])) != doubts:
         never = "does not say what its run leaves open"
         falsely = "says that its run leaves open what it does not"
         unlike.append(f"the log {never if doubts else falsely}: {'; '.join(doubts or left)}")

@@ -18,7 +18,6 @@ from factory.apps.recovery.recovery import recover
 from factory.apps.resume.continued import Continued, last_full
 from factory.apps.resume.remade import request_of
 from factory.support.claim import claimed_again
-from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
 """What ends a run that would end in the same way if it went on."""
@@ -110,7 +109,7 @@ def _check(path: Path, log: Log, max_time: float | None) -> None:
 
 def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
     """The request before timestep and wip were chosen for it."""
-    settings = replace(request.settings, timestep=AUTO) if timestep else request.settings
+    settings = replace(request.settings, timestep="auto") if timestep else request.settings
     return replace(request, settings=settings, wip=None if wip else request.wip)
 
 

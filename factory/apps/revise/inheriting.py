@@ -11,9 +11,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from factory.api import Layout, MarkedNet, Point2
+from factory.api import Layout, MarkedNet, coordinated
 from factory.apps.revise.pairing import Pairing
-from factory.floor.layout.exclusions import coordinated
+from factory.support.boxes import Point2
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
-from factory.api import PAG, Assembly, read_bytes
+from factory.api import PAG, Assembly, Parameter, Value
 from factory.support.cache import digest
-from factory.support.files import MESH
-from factory.theory.problem.pag import Parameter, Value
+from factory.support.files import MESH, read_bytes
 
 Shift = tuple[float, float, float]
 """A translation (x, y, z) [m]."""

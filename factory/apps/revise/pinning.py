@@ -14,27 +14,29 @@ from math import ceil
 
 from factory.api import (
     Certificate,
+    Clearance,
     Factory,
     Hands,
     Layout,
     Pace,
     Product,
+    carriers,
     certify,
     payload_boxes,
 )
 from factory.apps.revise.pins import Pins
+from factory.floor.layout.branches import branch_of
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.crowding import crowding_faults
-from factory.floor.layout.dimensions import TOOL_TRAVEL, Clearance, up
+from factory.floor.layout.dimensions import TOOL_TRAVEL
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.durations import cycle_of
-from factory.floor.layout.layout import branch_of, carriers
 from factory.floor.layout.optimising import arrange, shape_of
 from factory.floor.layout.packing import Task
 from factory.floor.layout.shapes import Shape, headings
 from factory.floor.layout.sides import admissible
 from factory.floor.layout.stops import carried
 from factory.floor.layout.stretching import Stretched
+from factory.support.decimals import up
 
 STEP = 0.02
 """Stations for what is new are so far apart [m]."""
@@ -295,5 +297,5 @@ class Pinning:
         lacking = sum(fault.lacking or JAM for fault in faults)
         displaced = len(self.pins.ends) - len(self.pins.in_place(layout)[1])
         score = lacking + WEIGHT * displaced + LENGTH * layout.guidepath_length
-        score += TIME * cycle_of(layout, self.task.pace)
+        score += TIME * self.task.pace.cycle_of(layout)
         return _Seen(stretch, layout, faults, lacking, score)

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from factory.api import Array, Hand, Layout, Point2, Product
+from factory.api import Hand, Layout, Product, carriers
 from factory.apps.revise.pairing import Pairing
-from factory.floor.layout.layout import carriers
 from factory.floor.layout.stops import carried
+from factory.support.arrays import Array
+from factory.support.boxes import Point2
 
 SAME = 1e-6
 """Lengths that differ by less are the same [m]."""

@@ -15,6 +15,7 @@ from typing import Any, Literal, get_args
 
 from factory.api import (
     NOPART,
+    Clearance,
     Factory,
     Ground,
     Hands,
@@ -24,7 +25,6 @@ from factory.api import (
     RunError,
     certified,
     pace,
-    usage_error,
 )
 from factory.apps.revise.inheriting import Inheritance
 from factory.apps.revise.matching import matching, shifted
@@ -32,8 +32,8 @@ from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
 from factory.apps.revise.revision_picture import draw_revision
-from factory.floor.layout.dimensions import Clearance
 from factory.floor.mating.mating import judged
+from factory.support.errors import usage_error
 
 Pin = Literal["all", "hands", "none"]
 """What is pinned of the old layout, the most first."""

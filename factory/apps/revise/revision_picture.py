@@ -7,11 +7,12 @@ from collections import Counter
 from collections.abc import Iterator
 from math import dist
 
-from factory.api import Layout, Point2
+from factory.api import Layout
 from factory.apps.drawing.canvas import Box, millimetres
 from factory.apps.exports.floor_plan import Flat, flat_shapes
 from factory.apps.exports.floor_sheet import FONT, LEGEND, FloorSheet
 from factory.apps.revise.pins import StayingRobot
+from factory.support.boxes import Point2
 
 STYLE = """
 .path { stroke-width: 5; } .last { stroke-width: 2.5; } .r { fill: #ffffff; }

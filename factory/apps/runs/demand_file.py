@@ -6,8 +6,9 @@ import random
 import re
 from pathlib import Path
 
-from factory.api import PAG, Demand, Diagnostic, InputError, Position, did_you_mean, read_bytes
-from factory.support.files import TABLE
+from factory.api import PAG, Demand, Diagnostic, InputError
+from factory.support.errors import Position, did_you_mean
+from factory.support.files import TABLE, read_bytes
 
 MOST = 10**9
 """The latest time of an order [s], and the largest count."""

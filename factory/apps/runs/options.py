@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, usage_error
-from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
+from factory.api import Diagnostic, InputError, WorldName
+from factory.support.bounds import check_values
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.api import Factory, Layout, Marking, Product, Project, RunRequest
@@ -98,8 +99,7 @@ class RunOptions:
     strict: bool = False
 
     def __post_init__(self) -> None:
-        check_choice("world", self.world, WORLDS)
-        names = ("units", "seed", "jitter", "wip", "max_time", "spares", "swap")
+        names = ("world", "units", "seed", "jitter", "wip", "max_time", "spares", "swap")
         check_values({name: getattr(self, name) for name in names})
 
     @property
@@ -133,7 +133,7 @@ class RunOptions:
         """The request of a run; `shown`: whether it is filmed or logged. Raises InputError."""
         from factory.api import RunRequest
         from factory.apps.runs.demand_file import demand_of
-        from factory.theory.nets.history import legal_marking
+        from factory.apps.runs.start import legal_marking
 
         self.check_combination()
         layout, start, units, demand = project.layout, self.start, self.units, None

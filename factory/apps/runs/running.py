@@ -8,14 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Factory, Run, Simulation
+from factory.api import Factory, Run, Simulation, proved
 from factory.apps.deviations.campaign import SWAP, Campaign
 from factory.apps.deviations.campaign_file import read_campaign
 from factory.apps.runs.executing import Go, Opening, Tell, carry_out
 from factory.apps.runs.options import RunOptions
 from factory.apps.runs.watched import watched
 from factory.support.progress import Waiting
-from factory.theory.nets.verify import proved
 
 if TYPE_CHECKING:
     from factory.api import Project, Recorder

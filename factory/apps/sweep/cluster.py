@@ -14,9 +14,10 @@ from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from factory.api import Diagnostic, InputError, RunError, optional
+from factory.api import Diagnostic, InputError, RunError
 from factory.apps.sweep.pool import Item, Result, Worked
 from factory.apps.sweep.recipe import versions
+from factory.support.version import optional
 
 if TYPE_CHECKING:
     from distributed import Client

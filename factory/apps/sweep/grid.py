@@ -11,10 +11,9 @@ from dataclasses import dataclass, fields
 from itertools import product
 from math import ceil, isfinite, prod
 
-from factory.api import Diagnostic, InputError, Settings, did_you_mean
+from factory.api import Diagnostic, InputError, Settings
 from factory.support.bounds import BOUNDS
-from factory.support.settings import RANGES, is_auto
-from factory.support.settings import WHOLE as WHOLE_SETTINGS
+from factory.support.errors import did_you_mean
 
 Value = float | int | str | None
 
@@ -25,7 +24,11 @@ SETTINGS = tuple(field.name for field in fields(Settings))
 
 WHOLE: Mapping[str, tuple[int, int]] = {
     **{name: (int(BOUNDS[name][0]), int(BOUNDS[name][1])) for name in ("seed", "units", "wip")},
-    **{name: (int(RANGES[name][0]), int(RANGES[name][1])) for name in WHOLE_SETTINGS},
+    **{
+        name: (int(low), int(high))
+        for name, (low, high) in Settings.RANGES.items()
+        if name in Settings.WHOLE
+    },
 }
 """Keys of whole numbers, with the least and the greatest value."""
 
@@ -134,7 +137,7 @@ def _read_axis(text: str) -> GridAxis:
 
 def _read_item(key: str, item: str) -> Iterator[Value]:
     """The values of one item of a list: a word, a number or a range."""
-    if key == "world" or is_auto(key, item):
+    if key == "world" or Settings.is_auto(key, item):
         yield item
     elif ":" in item:
         yield from _read_range(key, item)

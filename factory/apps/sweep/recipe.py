@@ -15,20 +15,20 @@ from factory.api import (
     Factory,
     Ground,
     Layout,
+    LayoutTable,
     Product,
     Project,
     load_catalogue,
-    table_of,
-    usage_error,
+    proved,
     write_pag,
+    write_template,
 )
 from factory.apps.runs.options import check_ideal
 from factory.apps.sweep.grid import DEFAULTS, SETTINGS, GridAxis, Point, Value
-from factory.floor.layout.saved import LayoutTable
+from factory.support.errors import usage_error
 from factory.support.resources import mjcf_folder
+from factory.support.tables import table_of
 from factory.support.version import __version__
-from factory.theory.lang.writer import write_template
-from factory.theory.nets.verify import proved
 
 
 @dataclass(frozen=True)

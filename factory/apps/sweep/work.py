@@ -11,7 +11,17 @@ from functools import lru_cache
 from time import perf_counter
 from typing import Any, TypeVar
 
-from factory.api import Diagnostic, FactoryError, Layout, Run, RunRequest, Settings, Simulation
+from factory.api import (
+    Diagnostic,
+    FactoryError,
+    Layout,
+    LayoutTable,
+    Run,
+    RunRequest,
+    Settings,
+    Simulation,
+    proved,
+)
 from factory.apps.deviations import Campaign, Deviation
 from factory.apps.recovery import recover
 from factory.apps.runs.options import fusing_pays
@@ -19,9 +29,7 @@ from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
 from factory.engine.mjcf.timestep import timed
-from factory.engine.simulation.compiled import Compiled, compiled
-from factory.floor.layout.saved import LAID_FOR
-from factory.theory.nets.verify import proved
+from factory.engine.simulation.compiled import Compiled
 
 T = TypeVar("T")
 
@@ -133,7 +141,9 @@ class Runner:
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
-        if recipe.laid and all(getattr(settings, k) == recipe.fixed[k] for k in LAID_FOR):
+        if recipe.laid and all(
+            getattr(settings, k) == recipe.fixed[k] for k in LayoutTable.LAID_FOR
+        ):
             return recipe.laid
         try:
             layout = recipe.ground.lay_out(recipe.factory, recipe.product, settings)
@@ -146,7 +156,7 @@ class Runner:
     def _compile(self, settings: Settings, request: RunRequest) -> Compiled | FactoryError:
         """Compile the model for settings; the request has the timestep as a number."""
         try:
-            return compiled(_or_raise(self._layout(settings)), request)
+            return Compiled.of(_or_raise(self._layout(settings)), request)
         except FactoryError as error:
             return error
 

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, add_station
-from factory.floor.layout.bins import PLATE, SILL, TOP, Bin
+from factory.engine.mjcf.elements import add_station
+from factory.floor.layout.bins import PLATE, SILL, Bin
 from factory.floor.layout.layout import Layout
+from factory.support.xml_writer import add
 
 DEEP = 0.1
 """So far below the floor a bin's bottom goes on, unseen: nothing falls through it between two
@@ -28,7 +29,7 @@ def add_bins(world: Element, layout: Layout, bins: Iterable[Bin]) -> None:
         add_station(body, f"{name}/bottom", **place, rgba=RED)
         for axis, letter in enumerate("xy"):
             for side in (-1, 1):
-                high = SILL if side * one.near[axis] > 0 else TOP
+                high = SILL if side * one.near[axis] > 0 else Bin.TOP
                 at, plate = [0.0, 0.0, high / 2], [*half, high / 2]
                 at[axis], plate[axis] = side * (half[axis] - PLATE / 2), PLATE / 2
                 wall = f"{name}/{letter}{side}"

@@ -1,49 +1,10 @@
-"""Small helpers to write MJCF elements: every number in full precision, attributes in a fixed
-order."""
+"""Elements that many bodies of the MJCF have."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
-Number = float | int
-
-
-def number(value: Number) -> str:
-    """The shortest text that reads back as the same number; lengths to a nanometre."""
-    whole = int(value)
-    if whole != value:
-        rounded = round(float(value), 9)
-        whole = int(rounded)
-        if whole != rounded:
-            return repr(rounded)
-    return str(whole)
-
-
-def numbers(values: Iterable[Number]) -> str:
-    """Numbers separated by spaces."""
-    return " ".join([number(v) for v in values])
-
-
-def exact(values: Iterable[Number]) -> str:
-    """Numbers to nine significant digits, for masses and inertias that may be tiny."""
-    return " ".join(f"{float(v):.9g}" for v in values)
-
-
-def add(parent: Element, tag: str, **attributes: object) -> Element:
-    """A child element. Tuples are written as numbers; None is left out; a trailing `_` is
-    dropped."""
-    child = SubElement(parent, tag)
-    fill(child, **attributes)
-    return child
-
-
-def fill(element: Element, **attributes: object) -> None:
-    """Give an element attributes, written as those of a child are."""
-    for name, value in attributes.items():
-        if value is not None:
-            text = value if isinstance(value, str) else _text(value)
-            element.set(name.rstrip("_"), text)
+from factory.support.xml_writer import add
 
 
 def add_shown(parent: Element, name: str, shape: str, **attributes: object) -> Element:
@@ -55,11 +16,3 @@ def add_shown(parent: Element, name: str, shape: str, **attributes: object) -> E
 def add_station(parent: Element, name: str, **attributes: object) -> Element:
     """A box of something that stands still, and that parts collide with."""
     return add(parent, "geom", name=name, class_="station", type="box", **attributes)
-
-
-def _text(value: object) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int | float):
-        return number(value)
-    return numbers(value)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, add_shown, add_station
+from factory.engine.mjcf.elements import add_shown, add_station
 from factory.engine.mjcf.masks import feeder_codes, masks_of
 from factory.engine.mjcf.robots import MOTOR, Drive, add_drive, heading_quaternion
 from factory.engine.mjcf.stops import stops_of
@@ -19,6 +19,7 @@ from factory.floor.layout.feeding import housed_outlets, outlets_of
 from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
+from factory.support.xml_writer import add
 
 SLIDER_MASS = 0.4
 """Mass of a slider with its rod and pad [kg]."""

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 from factory.engine.mjcf.parts import place_in
 from factory.engine.mjcf.robots import heading_quaternion
 from factory.floor.geometry.fused_bodies import FusedBodies
-from factory.floor.geometry.turning import fed_of, presented, upright
+from factory.floor.geometry.turning import fed_of
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
 from factory.support.arrays import Array
+from factory.support.rotations import upright
 
 Point3 = tuple[float, float, float]
 
@@ -71,7 +72,7 @@ def grips_of(layout: Layout, bodies: FusedBodies) -> Iterator[Grip]:
             begins, *_ = factory.tours[robot][turn]
             brought = factory.deliveries(robot)[turn : turn + 1] if robot not in chains else ()
             fed = next((fed_of(product, factory.contents[x]) for x in brought), 0.0)
-            centre = presented(product.solids[label]).centre if fed else bodies.centre[label]
+            centre = product.solids[label].presented().centre if fed else bodies.centre[label]
             yield Grip(robot, label, centre, layout, begins, fed)
 
 

@@ -7,10 +7,10 @@ from copy import deepcopy
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.elements import numbers
 from factory.floor.layout.hands.limbs import Limb
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.resources import mjcf_folder
+from factory.support.xml_writer import numbers
 
 Styles = Mapping[str, Element]
 """What each limb of a kind of hand looks like, by its name without number."""

@@ -13,12 +13,12 @@ from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.driving import HOIST_STIFFNESS, drive_for
-from factory.engine.mjcf.elements import numbers
 from factory.engine.mjcf.robots import Drive, add_drive
 from factory.engine.mjcf.stops import stops_of
 from factory.floor.layout.hands.clamp import Clamp
 from factory.floor.layout.layout import Layout
 from factory.support.settings import Settings
+from factory.support.xml_writer import numbers
 from factory.theory.plant.gripping import JAW_ACCELERATION, jaw_time
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.robot_bodies import Jaw

@@ -29,8 +29,13 @@ _fingerprints: dict[bytes, Fingerprint] = {}
 
 
 def load(model: Model) -> mujoco.MjModel:
-    """The engine's model of a factory. Raises InputError (BadMesh, BadValue, Engine) where the
-    engine refuses it."""
+    """The engine's model of a factory.
+
+    Args:
+        model: the model as MJCF.
+
+    Raises InputError (BadMesh, BadValue, Engine) where the engine refuses it.
+    """
     try:
         m = compiled(model.xml, model.files)
     except ValueError as error:

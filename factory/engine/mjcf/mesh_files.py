@@ -9,16 +9,13 @@ that is to look as if of one; what collides in its place is written as STL, a fi
 from __future__ import annotations
 
 import io
-import struct
 
 import numpy as np
 
 from factory.floor.geometry.insets import inset
-from factory.floor.geometry.meshes import Mesh, hull_mesh, normals_of
+from factory.floor.geometry.meshes import Mesh
 from factory.support.arrays import Array, Indices
-
-CREASE = 31.0
-"""Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""
+from factory.support.meshes.triangles import convex_hull, corner_normals, stl
 
 
 def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
@@ -29,9 +26,11 @@ def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
     if mesh.pieces:
         body.merge_vertices()
         outside = Mesh(mesh.name, np.asarray(body.vertices), np.asarray(body.faces))
-        return f"{mesh.name}.obj", obj(outside.vertices, outside.faces, corner_normals(outside))
+        return f"{mesh.name}.obj", obj(
+            outside.vertices, outside.faces, corner_normals(outside.vertices, outside.faces)
+        )
     if body.is_watertight and body.is_winding_consistent and body.volume > 0:
-        return f"{mesh.name}.stl", stl(mesh)
+        return f"{mesh.name}.stl", stl(mesh.vertices, mesh.faces)
     return f"{mesh.name}.obj", two_sided_obj(mesh)
 
 
@@ -39,7 +38,7 @@ def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
     """The files of the convex bodies that collide in a mesh's place: names, counted from 1, and
     contents."""
     named = ((f"{mesh.name}.{n}", vertices) for n, vertices in enumerate(mesh.pieces, 1))
-    return [(f"{name}.stl", stl(hull_mesh(name, vertices))) for name, vertices in named]
+    return [(f"{name}.stl", stl(*convex_hull(vertices))) for name, vertices in named]
 
 
 def inset_name(mesh: Mesh, number: int, depth: float) -> str:
@@ -52,23 +51,12 @@ def inset_file(mesh: Mesh, number: int, depth: float) -> tuple[str, bytes]:
     """The file of that body: name and content. A mesh without pieces has one, its hull."""
     name = inset_name(mesh, number, depth)
     whole = mesh.pieces[number] if mesh.pieces else mesh.vertices
-    return f"{name}.stl", stl(hull_mesh(name, inset(whole, depth)))
-
-
-def stl(mesh: Mesh) -> bytes:
-    """A mesh as a binary STL file."""
-    corners: Array = mesh.vertices[mesh.faces]
-    normal = face_normals(mesh)
-    record = np.zeros(
-        len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
-    )
-    record["normal"], record["corners"] = normal, corners
-    return b"\0" * 80 + struct.pack("<I", len(corners)) + record.tobytes()
+    return f"{name}.stl", stl(*convex_hull(inset(whole, depth)))
 
 
 def two_sided_obj(mesh: Mesh) -> bytes:
     """A mesh as an OBJ file in which every triangle has a back too, lit from its own side."""
-    normals = corner_normals(mesh)
+    normals = corner_normals(mesh.vertices, mesh.faces)
     return obj(
         mesh.vertices,
         np.concatenate([mesh.faces, mesh.faces[:, ::-1]]),
@@ -85,37 +73,3 @@ def obj(vertices: Array, faces: Indices, normals: Array) -> bytes:
     np.savetxt(text, across, fmt="vn %.4f %.4f %.4f")
     np.savetxt(text, indices, fmt="f %d//%d %d//%d %d//%d")
     return text.getvalue().encode()
-
-
-def face_normals(mesh: Mesh) -> Array:
-    """Unit normals of the triangles (m, 3); zero where a triangle has no area."""
-    normal = normals_of(mesh.vertices, mesh.faces)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))
-
-
-def corner_normals(mesh: Mesh) -> Array:
-    """The normal at each corner of each triangle (m, 3, 3): the mean over the triangles at that
-    vertex that meet it at less than CREASE, whichever way round they are wound."""
-    from scipy.sparse import csr_matrix
-
-    normal, count = face_normals(mesh), len(mesh.faces)
-    area = np.linalg.norm(normals_of(mesh.vertices, mesh.faces), axis=1)
-    at = csr_matrix(
-        (np.ones(3 * count), (np.arange(3 * count), mesh.faces.ravel())),
-        shape=(3 * count, len(mesh.vertices)),
-    )
-    here, there = (at @ at.T).nonzero()
-    agree = np.einsum("ij,ij->i", normal[here // 3], normal[there // 3])
-    near = np.abs(agree) > np.cos(np.radians(CREASE))
-    here, there, agree = here[near], there[near], agree[near]
-    weight = np.sign(agree) * area[there // 3]
-    total = np.stack(
-        [np.bincount(here, weight * normal[there // 3, k], 3 * count) for k in range(3)], axis=1
-    )
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    at_corner = np.repeat(normal, 3, axis=0)
-    at_corner[np.linalg.norm(at_corner, axis=1) == 0] = (0.0, 0.0, 1.0)
-    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), at_corner)).reshape(
-        -1, 3, 3
-    )

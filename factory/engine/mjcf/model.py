@@ -17,6 +17,7 @@ from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
+from factory.engine.mjcf import names
 from factory.engine.mjcf.bins import add_bins
 from factory.engine.mjcf.driving import (
     GRAVITY,
@@ -24,7 +25,6 @@ from factory.engine.mjcf.driving import (
     drive_for,
     driven_axes,
 )
-from factory.engine.mjcf.elements import fill
 from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.engine.mjcf.insets import Insets, insets_of
 from factory.engine.mjcf.jaws import add_jaws
@@ -42,6 +42,7 @@ from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
+from factory.support.xml_writer import fill
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.plant.approaches import Pair
 from factory.theory.plant.factory import Factory
@@ -110,6 +111,16 @@ class Model:
     def excluded(self) -> tuple[Pair, ...]:
         """The pairs of parts between which there is no contact."""
         return self.insets.excluded
+
+    @cached_property
+    def weights(self) -> Mapping[str, float]:
+        """What lifts, sliders and the shutter carry at the start [N], by the names of joints."""
+        hanging = (axis for axis in self.factory.axes if axis.motion.hangs)
+        masses = {names.joint(axis): axis.joint.mass for axis in hanging}
+        for outlet in outlets_of(self.layout):
+            masses[names.slider(outlet.label)] = SLIDER_MASS + self.masses[outlet.label]
+        masses[names.SHUTTER] = SHUTTER_MASS
+        return {joint: mass * GRAVITY for joint, mass in masses.items()}
 
     @cached_property
     def bodies(self) -> int:

@@ -10,13 +10,15 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, add_station
+from factory.engine.mjcf.elements import add_station
 from factory.engine.mjcf.masks import masks_of, tray_code
 from factory.engine.mjcf.robots import MOTOR, Drive, add_drive
 from factory.engine.mjcf.stops import stops_of, tray_clearance
 from factory.floor.layout.dimensions import BELT_GAP, PAYLOAD, PLAY, TRAY, WALL
-from factory.floor.layout.layout import Layout, Point2
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.outfeed import BELT, SLIT, dip_of, slot_of, slotted, table
+from factory.support.boxes import Point2
+from factory.support.xml_writer import add
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""

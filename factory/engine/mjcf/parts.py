@@ -6,18 +6,19 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.elements import add, exact, numbers
 from factory.engine.mjcf.insets import Insets
 from factory.engine.mjcf.mesh_files import inset_file, inset_name, mesh_file, piece_files
 from factory.engine.mjcf.names import part, piece
 from factory.engine.mjcf.names import solid as solid_name
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside
 from factory.floor.geometry.solids import Product, Solid
-from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.hanging import Hanging
-from factory.floor.layout.layout import Layout, Point2
+from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
+from factory.support.boxes import Point2
+from factory.support.rotations import upright
+from factory.support.xml_writer import add, exact, numbers
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
@@ -42,7 +43,7 @@ def place_in(
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
     operation = layout.factory.by_label[label]
-    centre = presented(layout.product.solids[label]).centre
+    centre = layout.product.solids[label].presented().centre
     elevation = layout.visits[operation.index, operation.carrier].elevation
     return place_in(layout.product, centre, layout.meeting(operation), elevation)
 

@@ -8,7 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, add_shown, numbers
+from factory.engine.mjcf.elements import add_shown
 from factory.engine.mjcf.hands import Styles, load_hand
 from factory.engine.mjcf.names import carriage
 from factory.engine.mjcf.robots import (
@@ -21,10 +21,12 @@ from factory.engine.mjcf.robots import (
 )
 from factory.engine.mjcf.scene import add_follower
 from factory.engine.mjcf.stops import stops_of
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.layout import Guidepath, Layout
+from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
+from factory.support.xml_writer import add, numbers
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.robot_types import Catalogue

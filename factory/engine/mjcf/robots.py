@@ -11,14 +11,14 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, number, numbers
 from factory.engine.mjcf.hands import Styles, add_hand
 from factory.engine.mjcf.names import carriage, drive_across, head, slide_across, tool
 from factory.engine.mjcf.stops import Stops
 from factory.engine.mjcf.tools import TOOL, mount_tool
 from factory.floor.layout.dimensions import PAYLOAD
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.limbs import Limb
-from factory.floor.layout.layout import Guidepath
+from factory.support.xml_writer import add, number, numbers
 from factory.theory.plant.axes import Axis
 from factory.theory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody
 from factory.theory.problem.robot_types import RobotType

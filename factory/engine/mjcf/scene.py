@@ -8,15 +8,16 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.engine.mjcf.elements import add, add_shown, add_station, fill, numbers
+from factory.engine.mjcf.elements import add_shown, add_station
 from factory.engine.mjcf.names import COMPASS
 from factory.engine.mjcf.robots import heading_quaternion
-from factory.floor.geometry.sight import Framing, View, fit, towards
 from factory.floor.layout.dimensions import PAYLOAD, Clearance
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.tiles import tiles_of
 from factory.support.arrays import Array
+from factory.support.pictures.sight import Framing, View, fit, towards
+from factory.support.xml_writer import add, fill, numbers
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective. The free

@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.elements import number, numbers
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.layout import Layout
+from factory.support.xml_writer import number, numbers
 
 OVERLOAD = 5.0
 """A stop withstands a drive at full force and so many times its force besides."""

@@ -11,10 +11,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.engine.mjcf.elements import number, numbers
 from factory.floor.layout.hands.limbs import Limb
 from factory.floor.layout.layout import Layout
 from factory.support.errors import Diagnostic, InputError
+from factory.support.xml_writer import number, numbers
 from factory.theory.problem.robot_bodies import LIFT_JOINT, TURN_JOINT, RobotBody
 
 GYRATION = 2e-4

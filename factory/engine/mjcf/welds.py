@@ -7,14 +7,14 @@ from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf import names
-from factory.engine.mjcf.elements import add, numbers
 from factory.engine.mjcf.grips import grips_of, seen_from, turned
 from factory.engine.mjcf.parts import parked_at, place_in
 from factory.floor.geometry.fused_bodies import FusedBodies, Inside
-from factory.floor.geometry.turning import presented, upright
 from factory.floor.layout.feeding import outlets_of
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
+from factory.support.rotations import upright
+from factory.support.xml_writer import add, numbers
 
 
 def add_welds(
@@ -36,7 +36,7 @@ def add_welds(
         (x, y), (u, v) = (o.layout.meeting(o.leaf) for o in (outlet, outlets[slider]))
         height = outlet.elevation - hanging.raised[label]
         solid, shown = layout.product.solids[label], slider == label
-        centre = presented(solid).centre if solid.fed else bodies.centre[label]
+        centre = solid.presented().centre if solid.fed else bodies.centre[label]
         offset = place_in(layout.product, centre, (x - u, y - v), height)
         pose = *turned(offset, path.heading), *seen_from(path, solid.fed)
         body = names.part(label, 1)

@@ -118,6 +118,11 @@ class Failures:
     unseen: tuple[str, ...] = ()
 
     @property
+    def deaths(self) -> list[Death]:
+        """The deaths among those that were detected."""
+        return deaths(self.found)
+
+    @property
     def scrapped(self) -> int:
         """How many parts and sub-assemblies were scrapped."""
         return sum(len(failing.scrapped) for failing in self.found)

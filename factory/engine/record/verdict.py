@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 from factory.engine.mjcf import names
 from factory.engine.record.findings import Report
@@ -84,17 +85,11 @@ LIMITS = (
 )
 """The bounds on the bodies, in addition to the findings of the monitor."""
 
-MOST = {limit.figure: limit.most for limit in LIMITS}
-"""The bound on each figure."""
-
 NAMES = tuple(dict.fromkeys(limit.names for limit in LIMITS if limit.names))
 """The figures that list bodies in contact or out of place."""
 
 STRENGTH = "grip_strength_share_max"
 """A figure without a bound here: a run in which it is too large has ended by that (Dropped)."""
-
-MEASURED = (*(limit.figure for limit in LIMITS), STRENGTH)
-"""The figures that say how near the bodies of a run came to a failure."""
 
 DROPPED = "dropped_s"
 """The figure with the time at which a load was dropped, which ends a run a little later [s]."""
@@ -105,12 +100,6 @@ FIGURES = (
     *(STRENGTH, DROPPED),
 )
 """The figures that are numbers or None."""
-
-FAULTS = "faults"
-"""The figure that lists the faults of the model of a run, as pairs of code and message."""
-
-RESERVATIONS = "reservations"
-"""The figure that lists what a run does not show, in words."""
 
 NOT_JUDGED = "NotJudged"
 """The code of a log that cannot be judged here."""
@@ -127,6 +116,10 @@ class RunVerdict:
     """The verdict on a run.
 
     Attributes:
+        MOST: the bound on each figure of the bodies.
+        MEASURED: the figures that say how near the bodies of a run came to a failure.
+        FAULTS: the figure that lists the faults of the model, as pairs of code and message.
+        RESERVATIONS: the figure that lists what a run does not show, in words.
         trouble: what ended it early; None for nothing.
         refines: whether its record refines the net.
         bodies: failures of the bodies, in the order of time.
@@ -137,6 +130,11 @@ class RunVerdict:
         reservations: what else qualifies its success, in words.
         strict: whether a qualified success is a failure.
     """
+
+    MOST: ClassVar[Mapping[str, float]] = MappingProxyType({x.figure: x.most for x in LIMITS})
+    MEASURED: ClassVar[tuple[str, ...]] = (*(limit.figure for limit in LIMITS), STRENGTH)
+    FAULTS: ClassVar[str] = "faults"
+    RESERVATIONS: ClassVar[str] = "reservations"
 
     trouble: Diagnostic | None = None
     refines: bool = True
@@ -215,32 +213,60 @@ class RunVerdict:
             "qualified": [*self.qualified],
         }
 
+    @classmethod
+    def of(
+        cls,
+        trouble: Diagnostic | None,
+        refines: bool,
+        figures: Mapping[str, Any] | None,
+        report: Report | None,
+        lenient: bool = False,
+        faults: Sequence[Diagnostic] = (),
+    ) -> RunVerdict:
+        """The verdict on a run: `trouble` ended it early, `refines`: whether its record refines
+        the net; `figures` of its bodies, from `kept_figures`, and the `report` of a monitor, where
+        there are any; `faults` of its model beside those in the figures."""
+        figures = {**(figures or {})}
+        every = [Diagnostic(code, words) for code, words in figures.get(RunVerdict.FAULTS, [])]
+        every += faults
+        timed = sorted(_failures(figures, every, report), key=lambda failure: failure[0])
+        dropped = figures.get(DROPPED)
+        ended = inf if dropped is None else dropped
+        before = sum(t < ended for t, _ in timed)
+        unjudged = [fault for fault in every if fault.code == NOT_JUDGED]
+        if unjudged:
+            return cls(unjudged[0], refines)
+        blocked = tuple(fault for fault in every if fault.code == BLOCKED)
+        bodies = tuple(failure for _, failure in timed)
+        doubts = tuple(figures.get(RunVerdict.RESERVATIONS, ()))
+        return cls(trouble, refines, bodies, lenient, before, blocked, doubts)
 
-def judged(
-    trouble: Diagnostic | None,
-    refines: bool,
-    figures: Mapping[str, Any] | None,
-    report: Report | None,
-    lenient: bool = False,
-    faults: Sequence[Diagnostic] = (),
-) -> RunVerdict:
-    """The verdict on a run: `trouble` ended it early, `refines`: whether its record refines the
-    net; `figures` of its bodies, from `kept_figures`, and the `report` of a monitor, where there
-    are any; `faults` of its model beside those in the figures."""
-    figures = {**(figures or {})}
-    every = [Diagnostic(code, words) for code, words in figures.get(FAULTS, [])]
-    every += faults
-    timed = sorted(_failures(figures, every, report), key=lambda failure: failure[0])
-    dropped = figures.get(DROPPED)
-    ended = inf if dropped is None else dropped
-    before = sum(t < ended for t, _ in timed)
-    unjudged = [fault for fault in every if fault.code == NOT_JUDGED]
-    if unjudged:
-        return RunVerdict(unjudged[0], refines)
-    blocked = tuple(fault for fault in every if fault.code == BLOCKED)
-    bodies = tuple(failure for _, failure in timed)
-    doubts = tuple(figures.get(RESERVATIONS, ()))
-    return RunVerdict(trouble, refines, bodies, lenient, before, blocked, doubts)
+    @staticmethod
+    def kept_figures(physics: Any) -> dict[str, Any]:
+        """The figures of the bodies of a run that a verdict needs, or that a log lacks."""
+        kept = {figure: getattr(physics, figure) for figure in (*FIGURES, *NAMES)}
+        kept[RunVerdict.FAULTS] = [[fault.code, fault.message] for fault in physics.faults]
+        kept[RunVerdict.RESERVATIONS] = [*physics.reservations]
+        judged_figures = {limit.figure for limit in LIMITS}
+        return {
+            figure: value for figure, value in kept.items() if value or figure in judged_figures
+        }
+
+    @staticmethod
+    def check_kept_figures(figures: Any) -> None:
+        """Raises ValueError where figures do not have the form of `kept_figures`."""
+        if not isinstance(figures, dict):
+            raise ValueError("its figures are not a table")
+        for figure in FIGURES:
+            value = figures.get(figure)
+            if value is not None and type(value) not in (int, float):
+                raise ValueError(f"its figure '{figure}' is not a number")
+        for figure in (*NAMES, RunVerdict.RESERVATIONS):
+            if not _are_texts(figures.get(figure, [])):
+                raise ValueError(f"its figure '{figure}' is not a list of texts")
+        faults = figures.get(RunVerdict.FAULTS, [])
+        if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
+            raise ValueError(f"its figure '{RunVerdict.FAULTS}' is not a list of pairs of texts")
 
 
 def _failures(
@@ -258,31 +284,6 @@ def _failures(
             yield inf if t is None else t, failure
     for violation in report.violations if report else ():
         yield violation.t, violation.diagnostic()
-
-
-def kept_figures(physics: Any) -> dict[str, Any]:
-    """The figures of the bodies of a run that a verdict needs, or that a log lacks otherwise."""
-    kept = {figure: getattr(physics, figure) for figure in (*FIGURES, *NAMES)}
-    kept[FAULTS] = [[fault.code, fault.message] for fault in physics.faults]
-    kept[RESERVATIONS] = [*physics.reservations]
-    judged_figures = {limit.figure for limit in LIMITS}
-    return {figure: value for figure, value in kept.items() if value or figure in judged_figures}
-
-
-def check_kept_figures(figures: Any) -> None:
-    """Raises ValueError where figures do not have the form of `kept_figures`."""
-    if not isinstance(figures, dict):
-        raise ValueError("its figures are not a table")
-    for figure in FIGURES:
-        value = figures.get(figure)
-        if value is not None and type(value) not in (int, float):
-            raise ValueError(f"its figure '{figure}' is not a number")
-    for figure in (*NAMES, RESERVATIONS):
-        if not _are_texts(figures.get(figure, [])):
-            raise ValueError(f"its figure '{figure}' is not a list of texts")
-    faults = figures.get(FAULTS, [])
-    if not isinstance(faults, list) or not all(_are_texts(f) and len(f) == 2 for f in faults):
-        raise ValueError(f"its figure '{FAULTS}' is not a list of pairs of texts")
 
 
 def _are_texts(value: Any) -> bool:

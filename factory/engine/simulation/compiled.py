@@ -25,14 +25,14 @@ class Compiled:
     model: Model | None = None
     loaded: EngineModel | None = None
 
+    @classmethod
+    def of(cls, layout: Layout, request: RunRequest) -> Compiled:
+        """What runs share whose requests differ in seed and jitter alone, and that begin at the
+        beginning. Raises InputError as `Simulation` does."""
+        modes = operation_modes(layout, request.settings.eps)
+        if request.world == "ideal":
+            return cls(modes)
+        from factory.engine.mjcf.loading import load
 
-def compiled(layout: Layout, request: RunRequest) -> Compiled:
-    """What runs share whose requests differ in seed and jitter alone, and that begin at the
-    beginning. Raises InputError as `Simulation` does."""
-    modes = operation_modes(layout, request.settings.eps)
-    if request.world == "ideal":
-        return Compiled(modes)
-    from factory.engine.mjcf.loading import load
-
-    model = modelled(layout, request, {})
-    return Compiled(modes, model, load(model))
+        model = modelled(layout, request, {})
+        return cls(modes, model, load(model))

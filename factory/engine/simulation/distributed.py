@@ -29,7 +29,7 @@ from factory.theory.control.mode import ROUNDING, STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
-from factory.theory.plant.programs import Program, ProgramStep, program_of
+from factory.theory.plant.programs import Program, ProgramStep
 
 
 @dataclass(slots=True)
@@ -127,7 +127,7 @@ class DistributedSupervisor:
         axes_of = [*factory.moves, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
-        programs = [program_of(factory, robot.index) for robot in factory.robots]
+        programs = [Program.of(factory, robot.index) for robot in factory.robots]
         self.cells = Cells(factory, [program.steps[0].label for program in programs])
         self.processes = self._processes(programs)
         self.record, self.ordering = Record(factory), Ordering()

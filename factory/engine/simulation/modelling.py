@@ -13,9 +13,10 @@ from factory.floor.geometry.fused_bodies import FusedBodies, bodies_of, fused_co
 from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.layout.bins import Bin, bins_of
 from factory.floor.layout.layout import Layout
+from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
-from factory.theory.problem.robot_types import Catalogue, load_catalogue
+from factory.theory.problem.robot_types import Catalogue
 
 if TYPE_CHECKING:
     from factory.engine.mjcf.model import Model

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from factory.support.bounds import WORLDS, WorldName, check_choice, check_values
+from factory.support.bounds import WorldName, check_values
 from factory.support.settings import Settings
 from factory.theory.nets.petri import Marking
 from factory.theory.plant.demand import Demand
@@ -51,5 +51,5 @@ class RunRequest:
     demand: Demand | None = None
 
     def __post_init__(self) -> None:
-        check_choice("world", self.world, WORLDS)
-        check_values({n: getattr(self, n) for n in ("units", "seed", "jitter", "wip")})
+        names = ("world", "units", "seed", "jitter", "wip")
+        check_values({name: getattr(self, name) for name in names})

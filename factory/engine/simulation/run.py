@@ -12,7 +12,7 @@ from factory.engine.record.failures import Failures
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.findings import Report
 from factory.engine.record.state import Event
-from factory.engine.record.verdict import RunVerdict, judged, kept_figures
+from factory.engine.record.verdict import RunVerdict
 from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
 from factory.theory.nets.undone import Entry, Undone, lasting
@@ -157,8 +157,8 @@ class Run:
     @cached_property
     def verdict(self) -> RunVerdict:
         """Whether the run made its units, is a run of the net, and its bodies agree."""
-        figures = None if self.physics is None else kept_figures(self.physics)
-        verdict = judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
+        figures = None if self.physics is None else RunVerdict.kept_figures(self.physics)
+        verdict = RunVerdict.of(self.trouble, self.replays, figures, self.monitor, self.lenient)
         verdict = verdict.caused_by(self.failures.unseen if self.failures else ())
         return replace(verdict, strict=self.strict)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from factory.engine.mjcf.timestep import timed
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observer, State
-from factory.engine.simulation.compiled import Compiled, compiled
+from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.distributed import DistributedSupervisor
 from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.modelling import modelled
@@ -23,8 +23,7 @@ from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
 from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.on_demand import cycle_of
-from factory.engine.timing.timed import duration
-from factory.engine.timing.timed import timed as timed_net
+from factory.engine.timing.timed import Timed, duration
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.resting import on_demand, start_at_rest
@@ -118,7 +117,7 @@ class Simulation:
 
     def again(self, seed: int) -> Simulation:
         """Another run of the same with another seed; what both share is compiled once."""
-        self._shared = self._shared or compiled(self.layout, self.asked)
+        self._shared = self._shared or Compiled.of(self.layout, self.asked)
         return Simulation(self.layout, replace(self.asked, seed=seed), self._shared)
 
     @cached_property
@@ -324,7 +323,7 @@ class Simulation:
             return False
         if len(left) > SETTLED or abs(measured / pace - 1) < AGREES:
             return False
-        net = timed_net(self.timing, wip=wip)
+        net = Timed.of(self.timing, wip=wip)
         foretold = mean_interval(net.departures(len(left)), period)
         return foretold is not None and abs(foretold / pace - 1) >= AGREES
 

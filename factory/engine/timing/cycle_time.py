@@ -38,33 +38,34 @@ class CycleTime:
         message = f"the fastest factory found takes {least} s a product, not {asked:g} s"
         return Diagnostic("SlowCycle", message, None, f"--cycle {least}, or {instead}")
 
+    @classmethod
+    def of(
+        cls,
+        subject: Factory | GearNet,
+        delays: Delays,
+        ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
+    ) -> CycleTime:
+        """The maximum over robots of the summed delays of its gear, which carries one token; of a
+        gear train the maximum cycle ratio. `ways`: what a robot (index) takes to a place [s] while
+        it waits for it (`with_ways`).
 
-def cycle_time(
-    subject: Factory | GearNet,
-    delays: Delays,
-    ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
-) -> CycleTime:
-    """The maximum over robots of the summed delays of its gear, which carries one token; of a gear
-    train the maximum cycle ratio. `ways`: what a robot (index) takes to a place [s] while it waits
-    for it (`with_ways`).
-
-    Holds since the simple circuits of a gear net are its gears. Where the factory makes several
-    units in one cycle of its net, it is that of one of them. The first robot that attains it is
-    the bottleneck; in a gear train the first that spends most of the critical circuit. Raises
-    ValueError where a delay is negative or names no place, or a gear train is not live.
-    """
-    net = subject.net if isinstance(subject, Factory) else subject
-    units = subject.period if isinstance(subject, Factory) else 1
-    seconds = _seconds(marked(net), delays)
-    if not net.is_tree:
-        ratio, (robot, *_) = train_ratio(net, seconds, ways)
-        return CycleTime(ratio.seconds / units, net.gears[robot].robot)
-    sums = [
-        sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)
-        for robot, gear in enumerate(net.gears)
-    ]
-    slowest = max(range(len(sums)), key=sums.__getitem__)
-    return CycleTime(sums[slowest] / units, net.gears[slowest].robot)
+        Holds since the simple circuits of a gear net are its gears. Where the factory makes several
+        units in one cycle of its net, it is that of one of them. The first robot that attains it is
+        the bottleneck; in a gear train the first that spends most of the critical circuit. Raises
+        ValueError where a delay is negative or names no place, or a gear train is not live.
+        """
+        net = subject.net if isinstance(subject, Factory) else subject
+        units = subject.period if isinstance(subject, Factory) else 1
+        seconds = _seconds(marked(net), delays)
+        if not net.is_tree:
+            ratio, (robot, *_) = train_ratio(net, seconds, ways)
+            return cls(ratio.seconds / units, net.gears[robot].robot)
+        sums = [
+            sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)
+            for robot, gear in enumerate(net.gears)
+        ]
+        slowest = max(range(len(sums)), key=sums.__getitem__)
+        return cls(sums[slowest] / units, net.gears[slowest].robot)
 
 
 def _seconds(net: MarkedNet, delays: Delays) -> list[float]:

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 from math import floor, sqrt
 
 from factory.engine.timing.cycle_time import CycleTime
-from factory.engine.timing.timed import timed
+from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
 from factory.floor.layout.bounds import cycle_time_bound
 from factory.floor.layout.dimensions import Clearance
@@ -111,7 +111,7 @@ def soonest(settings: Settings) -> Pace:
 
 
 def _cycle(layout: Layout, settings: Settings, wip: int | None) -> CycleTime:
-    return timed(Timing(layout, settings), wip=wip).cycle
+    return Timed.of(Timing(layout, settings), wip=wip).cycle
 
 
 def _figures(layout: Layout, cycle: CycleTime) -> Figures:

@@ -11,7 +11,7 @@ from math import inf
 
 from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.distributed import Scan, ScannedTimes
-from factory.engine.timing.timed import Timed, timed
+from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
 from factory.theory.nets.marked import token_free
 from factory.theory.plant.demand import Word
@@ -24,10 +24,10 @@ def cycle_of(
     units as far as the `word` is known, and the busiest robot; with `scans`, that of robots which
     run their own programs."""
     if scans:
-        return ScannedTimes(timed(timing, wip=wip), scans).cycle
+        return ScannedTimes(Timed.of(timing, wip=wip), scans).cycle
     if word.demand is None:
-        return timed(timing, wip=wip).cycle
-    return WordTimes(timed(timing), word).cycle
+        return Timed.of(timing, wip=wip).cycle
+    return WordTimes(Timed.of(timing), word).cycle
 
 
 class WordTimes:

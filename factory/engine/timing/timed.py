@@ -6,11 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
-from factory.engine.timing.cycle_time import CycleTime, cycle_time
+from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.pool import with_wip
 from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
+from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.theory.nets.earliest import earliest_firings
@@ -18,18 +20,15 @@ from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
 from factory.theory.problem.ids import is_end
 
-SAME = 1e-9
-"""Relative difference up to which times are equal."""
-
-OUTFEED, FEEDER = "outfeed", "feeder"
-"""What machines are called that are no robots, as a bottleneck."""
-
 
 @dataclass(frozen=True)
 class Timed:
     """The timed net: a marked graph with the time that a token stays in each place.
 
     Attributes:
+        OUTFEED: what the outfeed is called, as a bottleneck.
+        FEEDER: what a feeder is called, before the label of its part.
+        SAME: relative difference up to which times are equal.
         timing: the delays of the factory's operations.
         net: the net with its tokens.
         seconds: time in each place [s].
@@ -38,6 +37,10 @@ class Timed:
         wip: the most units inside at once; None for no bound.
         owners: by place, the robots (index) that are in it.
     """
+
+    OUTFEED: ClassVar[str] = "outfeed"
+    FEEDER: ClassVar[str] = "feeder"
+    SAME: ClassVar[float] = 1e-9
 
     timing: Timing
     net: MarkedNet
@@ -77,9 +80,9 @@ class Timed:
         places = map(self.net.net.places.__getitem__, self.ratio.circuit)
         modes = {place.mode: place.label for place in places}
         if "tray" in modes:
-            return OUTFEED
+            return self.OUTFEED
         if "magazine" in modes:
-            return f"{FEEDER} {modes['magazine']}"
+            return f"{self.FEEDER} {modes['magazine']}"
         return self.timing.factory.robots[self.busiest[0]].name
 
     @cached_property
@@ -91,60 +94,64 @@ class Timed:
     def departures(self, units: int) -> list[float]:
         """When each of so many units is dropped off at the earliest, from the initial marking with
         robots at their B ends [s]."""
-        factory = self.timing.factory
-        periods, ends = -(-units // factory.period), [o.end for o in factory.dropoffs]
-        dates = earliest_firings(self.net, self.seconds, periods, self.timing.first, self.ready)
-        return [float(date) for date in dates[:, ends].ravel()[:units]]
+        ends = [o.end for o in self.timing.factory.dropoffs]
+        return [float(date) for date in self.firings(units)[:, ends].ravel()[:units]]
+
+    def firings(self, units: int) -> Array:
+        """(cycles, T): the earliest dates [s] of the firings of each transition, from the initial
+        marking, for at least `units` products."""
+        cycles, first = -(-units // self.timing.factory.period), self.timing.first
+        return earliest_firings(self.net, self.seconds, cycles, first, self.ready)
 
     @property
     def cycle(self) -> CycleTime:
         """The cycle time and its bottleneck: a robot where its gear alone allows no less."""
         compiled = len(self.timing.factory.net.threaded.places)
         taken = {way: self.seconds[place] for way, place in self.ways.items()}
-        gears = cycle_time(self.timing.factory, self.seconds[:compiled], taken)
-        if gears.seconds >= self.pace * (1 - SAME):
+        gears = CycleTime.of(self.timing.factory, self.seconds[:compiled], taken)
+        if gears.seconds >= self.pace * (1 - self.SAME):
             return gears
         return CycleTime(self.pace, self.bottleneck)
 
+    @classmethod
+    def of(cls, timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
+        """The timed net of a layout with a change of its robots and a bound on copies of each part.
 
-def timed(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> Timed:
-    """The timed net of a layout with a change of its robots and a bound on copies of each part.
+        In a run a transition fires a tick after those that it waits for. The net has this tick in
+        each operation, so its ends come a tick late: what else follows an end takes a tick less.
 
-    In a run a transition fires a tick after those that it waits for. The net has this tick in each
-    operation, so its ends come a tick late: what else follows an end takes a tick less.
-
-    Raises InputError (BadValue) where `wip` is below 1.
-    """
-    factory, coordinated = timing.factory, timing.coordinated
-    net, count = _copied(timing, change), len(factory.net.threaded.places)
-    delays = timing.changed(change)
-    seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
-    owners: dict[int, tuple[int, ...]] = dict(enumerate(factory.net.slots))
-    dates = timing.passes(change)
-    dates |= {
-        past: max(0.0, date - timing.tick) for past, date in dates.items() if is_end(past.after)
-    }
-    for past, (place, before) in coordinated.passes.items():
-        seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
-        owners[place] = (factory.robot_of(past.axis),)
-    for number, served in coordinated.served.items():
-        up, seconds[served.down] = timing.strokes[number]
-        seconds[served.up] = up - timing.tick
-    for away in coordinated.away.values():
-        seconds[away] = timing.outfeed - timing.tick
-    bounds: tuple[int, ...] = ()
-    if wip is not None:
-        bounded = with_wip(factory, min(wip, len(factory.robots)))
-        more, tokens = bounded.net.places[count:], bounded.tokens[count:]
-        bounds = tuple(range(len(seconds), len(seconds) + len(more)))
-        places = replace(net.net, places=(*net.net.places, *more))
-        net = MarkedNet(places, (*net.tokens, *tokens))
-        seconds += [0.0] * len(more)
-    went = ways_apart(factory.net, seconds, timing.ways(change))
-    ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
-    owners |= {way: (robot,) for (robot, _), way in ways.items()}
-    net = with_ways(net, factory.net, went)
-    return Timed(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
+        Raises InputError (BadValue) where `wip` is below 1.
+        """
+        factory, coordinated = timing.factory, timing.coordinated
+        net, count = _copied(timing, change), len(factory.net.threaded.places)
+        delays = timing.changed(change)
+        seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]
+        owners: dict[int, tuple[int, ...]] = dict(enumerate(factory.net.slots))
+        dates = timing.passes(change)
+        dates |= {
+            past: max(0.0, date - timing.tick) for past, date in dates.items() if is_end(past.after)
+        }
+        for past, (place, before) in coordinated.passes.items():
+            seconds[place] = max(0.0, dates[past] - (dates[before] if before else 0.0))
+            owners[place] = (factory.robot_of(past.axis),)
+        for number, served in coordinated.served.items():
+            up, seconds[served.down] = timing.strokes[number]
+            seconds[served.up] = up - timing.tick
+        for away in coordinated.away.values():
+            seconds[away] = timing.outfeed - timing.tick
+        bounds: tuple[int, ...] = ()
+        if wip is not None:
+            bounded = with_wip(factory, min(wip, len(factory.robots)))
+            more, tokens = bounded.net.places[count:], bounded.tokens[count:]
+            bounds = tuple(range(len(seconds), len(seconds) + len(more)))
+            places = replace(net.net, places=(*net.net.places, *more))
+            net = MarkedNet(places, (*net.tokens, *tokens))
+            seconds += [0.0] * len(more)
+        went = ways_apart(factory.net, seconds, timing.ways(change))
+        ways = dict(zip(went, range(len(seconds), len(seconds) + len(went)), strict=True))
+        owners |= {way: (robot,) for (robot, _), way in ways.items()}
+        net = with_ways(net, factory.net, went)
+        return cls(timing, net, (*seconds, *went.values()), ways, bounds, wip, owners)
 
 
 def _copied(timing: Timing, change: Change) -> MarkedNet:
@@ -166,7 +173,7 @@ def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, tuple[float, ..
         settings: the settings of the run.
     """
     timing = Timing(layout, settings)
-    return timed(timing).cycle, timing.delays
+    return Timed.of(timing).cycle, timing.delays
 
 
 def duration(timing: Timing, cycle: float, units: int) -> float:

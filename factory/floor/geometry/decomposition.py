@@ -20,24 +20,21 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.alike import PartShape, motion_between, moved, shape_of
 from factory.floor.geometry.decimation import decimated
-from factory.floor.geometry.meshes import Mesh, is_closed, is_flat, normals_of, volume_of
+from factory.floor.geometry.meshes import Mesh, is_flat
 from factory.floor.geometry.overlap import bounded, merged
-from factory.floor.geometry.pieces import FLATNESS, closed_bodies, components, is_convex, joined
+from factory.floor.geometry.pieces import FLATNESS, closed_bodies, is_convex
 from factory.floor.geometry.prisms import prisms
 from factory.floor.geometry.slabs import SETTINGS, slabs
 from factory.support.arrays import Array, Indices
 from factory.support.cache import digest, load_arrays, packed, store_arrays, unpacked
 from factory.support.environment import environment
+from factory.support.meshes.alike import PartShape, motion_between, moved, shape_of
+from factory.support.meshes.triangles import components, is_closed, joined, normals_of, volume_of
 from factory.support.version import release
 
 FOLDER = "pieces"
 """The folder of decompositions in the user's cache."""
-
-FULL = 0.98
-"""A closed mesh that fills more than this share of its hull is represented by it, unless it has a
-hole through it, or another part stands in it."""
 
 CONCAVITY, SLENDER = (0.02, 0.05), 0.1
 """Bounds on the deviation that is allowed (CoACD's `threshold`), in units of about half the longest
@@ -110,7 +107,7 @@ def _pieces(body: Mesh, stood_in: bool) -> tuple[Array, ...]:
     if not _fills(body, 1 - FLATNESS):
         is_entered = stood_in or has_hole(body)
         pieces = prisms(body.vertices, body.faces) if is_entered else ()
-        if not pieces and (is_entered or not _fills(body, FULL)):
+        if not pieces and (is_entered or not _fills(body, Mesh.FULL)):
             pieces = _decomposed(body)
         pieces = tuple(piece for piece in pieces if not is_flat(piece))
         return pieces or (body.vertices,)

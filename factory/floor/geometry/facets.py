@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.overlap import merged
-from factory.floor.geometry.touching import connected
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.bodies import connected
+from factory.support.meshes.triangles import normals_of
 
 LEAST, MOST = np.deg2rad([1.0, 36.5])
 """The angles between two facets of a round surface [rad], which has ten of them at least. Triangles

@@ -4,7 +4,7 @@ of parts for each unit of a period."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import product as pairs
 from types import MappingProxyType
 
@@ -123,19 +123,6 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBo
         parts = factory.contents[label]
         wholes[label] = Whole(label, parts, mass[label], centre[label], sound(inertia[label]))
     return FusedBodies(carried, centre, mass, radius, wholes)
-
-
-def repeated(product: Product, factory: Factory) -> Product:
-    """A product with a solid for each part of a factory: those for further units of a period are
-    alike. The product itself where one unit is made at a time."""
-    if factory.period == 1:
-        return product
-    further = {
-        leaf.label: replace(product.solids[leaf.written], label=leaf.label)
-        for leaf in factory.leaves
-        if leaf.label not in product.solids
-    }
-    return replace(product, solids={**product.solids, **further})
 
 
 def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> dict[str, int]:

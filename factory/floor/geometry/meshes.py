@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import convex_hull, is_closed, volume_of
 
 if TYPE_CHECKING:
     import trimesh
@@ -41,12 +42,16 @@ class Mesh:
     """A triangle mesh in its own frame.
 
     Attributes:
+        FULL: a closed mesh that fills more than this share of its hull is represented by it, unless
+            it has a hole through it, or another part stands in it.
         name: of its file.
         vertices: [m] (n, 3).
         faces: vertices of each triangle (m, 3).
         pieces: vertices of the convex bodies that collide in its place [m] (k, 3) each; empty if
             its hull does.
     """
+
+    FULL: ClassVar[float] = 0.98
 
     name: str
     vertices: Array = field(repr=False)
@@ -91,18 +96,6 @@ def hull_of(points: Array) -> Hull:
     hull, box = ConvexHull(points, qhull_options="QbB Pp Qt"), np.ptp(points, axis=0)
     volume = float(hull.volume * box.prod())  # Qhull has scaled the points to a unit cube
     return Hull(points[np.sort(hull.vertices)], volume)
-
-
-def normals_of(vertices: Array, faces: Indices) -> Array:
-    """The normals (m, 3) of triangles, each twice as long as the area of its triangle."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    return np.asarray(np.cross(b - a, c - a))
-
-
-def volume_of(vertices: Array, faces: Indices) -> float:
-    """The volume of a closed mesh; negative if it is inside out."""
-    a, b, c = (vertices[faces[:, corner]] - vertices.mean(axis=0) for corner in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,30 +194,13 @@ def _box_mesh(name: str, low: Array, high: Array, axes: Array) -> Mesh:
     return Mesh(name, (np.asarray(box.vertices) + (low + high) / 2) @ axes, np.asarray(box.faces))
 
 
-def hull_mesh(name: str, points: Array) -> Mesh:
-    """The convex hull of points (n, 3), its faces turned outwards."""
-    import trimesh
-
-    hull = trimesh.convex.convex_hull(points)
-    return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
-
-
 def _coarse_hull(name: str, vertices: Array) -> Mesh:
     """The convex hull; if it has too many faces, that of the vertices rounded to a grid."""
-    hull = hull_mesh(name, vertices)
+    hull = Mesh(name, *convex_hull(vertices))
     if len(hull.faces) <= MOST_FACES:
         return hull
     step = float(np.ptp(vertices, axis=0).max()) / 250
-    return hull_mesh(name, np.unique(np.round(vertices / step), axis=0) * step)
-
-
-def is_closed(faces: Indices) -> bool:
-    """Whether triangles (m, 3) form a closed surface: every edge occurs equally often in both
-    directions. This also holds for bodies that share faces, edges or corners."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    edge = np.minimum(start, end) * (faces.max(initial=0) + 1) + np.maximum(start, end)
-    forth, back = (np.sort(edge[way]) for way in (start < end, start >= end))
-    return bool(np.array_equal(forth, back))
+    return Mesh(name, *convex_hull(np.unique(np.round(vertices / step), axis=0) * step))
 
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:

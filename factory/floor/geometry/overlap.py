@@ -28,11 +28,12 @@ from weakref import finalize
 import numpy as np
 
 from factory.floor.geometry.distances import distances_to
-from factory.floor.geometry.meshes import is_closed, normals_of
 from factory.floor.geometry.pieces import closed_bodies
-from factory.floor.geometry.solids import Solid, rotation
-from factory.floor.geometry.touching import connected
+from factory.floor.geometry.solids import Solid
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.bodies import connected
+from factory.support.meshes.triangles import is_closed, normals_of
+from factory.support.rotations import rotation
 
 ROUND = 5e-6
 """The largest deviation of the polytope that represents a round body [m]."""

@@ -9,15 +9,15 @@ convex hull, unless it consists of several bodies: see `closed_bodies` here and
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
 
 from factory.floor.geometry.meshes import hull_of
-from factory.floor.geometry.touching import as_they_come, bodies, connected
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.bodies import bodies
+from factory.support.meshes.triangles import submeshes
 
 ROUND = 5e-6
 """The tolerated protrusion of the polytope round a round body [m]."""
@@ -118,31 +118,6 @@ def _ball(frequency: int) -> tuple[Array, float]:
 
 def _unit(vector: Array) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
-
-
-def components(count: int, faces: Indices) -> Indices:
-    """The number of the connected component of each face (m, 3) of `count` vertices, in the order
-    of their first triangles. Triangles that share a vertex are connected."""
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
-    return as_they_come(connected(pairs, count)[faces[:, 0]])
-
-
-def submeshes(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array, Indices]]:
-    """The submeshes by which the faces of a mesh are numbered, as vertices (n, 3) and faces (m, 3)
-    each."""
-    order, ends = np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))
-    meshes = []
-    for mine in np.split(faces[order], ends[:-1]):
-        used, inverse = np.unique(mine, return_inverse=True)
-        meshes.append((vertices[used], inverse.reshape(-1, 3)))
-    return meshes
-
-
-def joined(bodies: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
-    """Bodies as one mesh, without common vertices."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
-    faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
-    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
 def closed_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:

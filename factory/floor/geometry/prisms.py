@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.meshes import normals_of, volume_of
 from factory.floor.geometry.overlap import bounded
 from factory.floor.geometry.pieces import MOST_PIECES
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import normals_of, volume_of
 
 EXACT = 1e-6
 """Two heights, and two volumes, are equal if they differ by no more than this share of the size of

@@ -27,9 +27,6 @@ from factory.floor.geometry.limits import (
     too_far,
     value_position,
 )
-from factory.floor.geometry.mending import mended
-from factory.floor.geometry.mesh_file import ANEW, MeshFile, UnreadableMesh, areas_of
-from factory.floor.geometry.mesh_reader import read_mesh
 from factory.floor.geometry.meshes import (
     SHEETS,
     MassProperties,
@@ -46,6 +43,10 @@ from factory.support.cache import digest, load_arrays, packed, program, store_ar
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
 from factory.support.interruption import side_by_side
+from factory.support.meshes.mending import mended
+from factory.support.meshes.mesh_file import ANEW, MeshFile, UnreadableMesh
+from factory.support.meshes.mesh_reader import read_mesh
+from factory.support.meshes.triangles import areas_of
 from factory.theory.problem.pag import PAG, SHAPES, Assembly
 
 
@@ -79,12 +80,19 @@ def product_geometry(
     report: Callable[[int, int], None] = lambda *_: None,
     entered: frozenset[str] | None = None,
 ) -> Product:
-    """The solids of all parts. Meshes are looked up in `files`, contents by path, before the folder
-    of the PAG. Where it is not `decomposed`, meshes that are not convex have their hulls for
-    bodies. `report` is called with the number of meshes that are read, and of how many. `entered`:
-    the parts in which others stand, where that is known of another attitude. Raises InputError if a
-    mesh cannot be read (BadMesh), or a part is too large, too far away or too heavy for the engine
-    (BadValue)."""
+    """The solids of all parts.
+
+    Args:
+        pag: the product.
+        files: contents of meshes by path, which are looked up before the folder of the PAG.
+        decomposed: whether meshes that are not convex are taken apart; else they have their hulls
+            for bodies.
+        report: called with the number of meshes that are read, and of how many.
+        entered: the parts in which others stand, where that is known of another attitude.
+
+    Raises InputError if a mesh cannot be read (BadMesh), or a part is too large, too far away or
+    too heavy for the engine (BadValue).
+    """
     reader = _Reader(Path(pag.folder), files, decomposed, report)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.floor.geometry.meshes import normals_of
 from factory.floor.geometry.overlap import bounded
 from factory.floor.geometry.prisms import SQUARE, Loop, frames, joined_loops, prism, sides_of
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import normals_of
 
 SHARE = 0.9
 """A body is decomposed so if at least this share of its surface is parallel or perpendicular to an

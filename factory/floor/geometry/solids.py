@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import colorsys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -15,6 +15,8 @@ from factory.floor.geometry.pieces import box_piece, cylinder_piece, sphere_piec
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.support.keeping import Keeping
+from factory.support.rotations import about_vertical, rotation, upright
+from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import Assembly
 
 DENSITY = 1000.0
@@ -74,6 +76,38 @@ class Solid:
     pieces: tuple[Array, ...] = field(default=(), repr=False)
     fed: float = 0.0
 
+    @property
+    def axis(self) -> Array:
+        """Where the axis about which a part turns stands (3,), at height 0 [m]."""
+        x, y, _ = (self.low + self.high) / 2
+        return np.array([x, y, 0.0])
+
+    def presented(self) -> Solid:
+        """A part as it is presented: turned about its axis by `fed`; itself where that is 0."""
+        if not self.fed:
+            return self
+        turn, axis = about_vertical(self.fed), self.axis
+
+        def moved(points: Array) -> Array:
+            return np.asarray((points - axis) @ turn.T + axis)
+
+        corners, pieces = moved(self.corners), tuple(map(moved, self.pieces))
+        every = np.concatenate(pieces)
+        w, x, y, z = self.quaternion
+        c, _, _, s = upright(self.fed)
+        return replace(
+            self,
+            position=moved(self.position),
+            quaternion=np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w]),
+            centre=moved(self.centre),
+            inertia=turn @ self.inertia @ turn.T,
+            low=every.min(axis=0),
+            high=every.max(axis=0),
+            corners=corners,
+            pieces=pieces,
+            fed=0.0,
+        )
+
 
 @dataclass(frozen=True)
 class Product(Keeping):
@@ -111,6 +145,18 @@ class Product(Keeping):
     def mass(self) -> float:
         """The total mass [kg]."""
         return float(sum(solid.mass for solid in self.solids.values()))
+
+    def repeated(self, factory: Factory) -> Product:
+        """The product with a solid for each part of a factory: those for further units of a period
+        are alike. Itself where one unit is made at a time."""
+        if factory.period == 1:
+            return self
+        further = {
+            leaf.label: replace(self.solids[leaf.written], label=leaf.label)
+            for leaf in factory.leaves
+            if leaf.label not in self.solids
+        }
+        return replace(self, solids={**self.solids, **further})
 
 
 def primitive(
@@ -204,19 +250,3 @@ def colour(node: Assembly, number: int) -> tuple[float, ...]:
     hue, saturation, value = PALETTE[index]
     red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)
     return (round(red, 3), round(green, 3), round(blue, 3), 1.0)
-
-
-def rotation(quaternion: Array) -> Array:
-    """A rotation matrix (3, 3).
-
-    Args:
-        quaternion: a unit quaternion (4,), w first.
-    """
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )

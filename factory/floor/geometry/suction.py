@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.floor.geometry.pieces import BOX_FACES, is_box
-from factory.floor.geometry.solids import Solid, rotation
+from factory.floor.geometry.solids import Solid
 from factory.support.arrays import Array
+from factory.support.rotations import rotation
 
 GAP = 1e-4
 """The gap between a pad and the part [m]."""

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from factory.floor.layout.guidepath import Guidepath, Point2
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.branches import carriers
+from factory.floor.layout.guidepath import Guidepath
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import Bend
+from factory.support.boxes import Point2
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,9 +8,10 @@ there is no room there is no bin.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import ClassVar
 
 import numpy as np
 import shapely
@@ -19,17 +20,17 @@ from shapely import STRtree
 from factory.floor.layout.certificate import BIN_BODY, PAYLOAD_BODY, STATIONS, Region
 from factory.floor.layout.crowding import Crowding, separation
 from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
-from factory.floor.layout.guidepath import Box, Point2, hull, moved
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.scrapping import not_carried_back
-from factory.floor.layout.sweeps import Pile, piles, regions
+from factory.floor.layout.sweeps import Pile, piles_of, regions
+from factory.support.boxes import Box, Point2, hull, moved
 from factory.theory.problem.pag import NOPART
 
 PLATE = 0.002
 """Thickness of a bin's plates [m]."""
 
-TOP, SILL = 0.06, 0.03
-"""How high a bin's plates are, and the one over which things come in [m]."""
+SILL = 0.03
+"""How high the plate of a bin is over which things come in [m]."""
 
 SLACK = 0.02
 """How much wider than what falls into it a bin is, on each side [m]."""
@@ -44,7 +45,10 @@ AHEAD, ASIDE = range(-1, 5), range(16)
 @dataclass(frozen=True, slots=True)
 class Bin:
     """The bin of a robot (index): its outer `box`, and the `labels` for which it is wide enough.
-    `near`: the side over which things come in, a unit vector from the bin to the lane."""
+    `near`: the side over which things come in, a unit vector from the bin to the lane; `TOP`: how
+    high its plates are [m]."""
+
+    TOP: ClassVar[float] = 0.06
 
     robot: int
     box: Box
@@ -66,8 +70,8 @@ class Bin:
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, at most one for each robot: wide enough for everything that
     it can carry back to B, else for the smallest."""
-    by_label = piles(layout.factory, layout.product)
-    taken, added = regions(layout, by_label), list[Region]()
+    by_label = piles_of(layout)
+    taken, added = regions(layout), list[Region]()
     corners = np.array([region.box for region in taken])
     tree = STRtree(shapely.box(*corners[:, [0, 2, 1, 3]].T))
     barred, made = not_carried_back(layout), list[Bin]()
@@ -91,7 +95,7 @@ Held = list[tuple[str, Pile]]
 
 
 def _held(
-    layout: Layout, robot: int, by_label: dict[str, Pile], barred: frozenset[tuple[int, str]]
+    layout: Layout, robot: int, by_label: Mapping[str, Pile], barred: frozenset[tuple[int, str]]
 ) -> Held:
     path, result = layout.guidepaths[robot], dict[str, Pile]()
     for number in layout.factory.robots[robot].operations:
@@ -146,7 +150,7 @@ def _size(box: Box) -> float:
 
 def _stands(one: Bin) -> list[Region]:
     return [
-        Region(one.robot, layer, BIN_BODY, one.box, (0.0, TOP), min(one.labels))
+        Region(one.robot, layer, BIN_BODY, one.box, (0.0, one.TOP), min(one.labels))
         for layer in (CARRIAGES, ARMS)
     ]
 

@@ -19,9 +19,10 @@ from dataclasses import dataclass
 from math import sqrt
 
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.footprint import ahead_of
-from factory.floor.layout.layout import BESIDE, carriers
+from factory.floor.layout.layout import BESIDE
 from factory.floor.layout.meeting import TOLERANCE
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.stops import carried

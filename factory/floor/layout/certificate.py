@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from factory.floor.layout.dimensions import Clearance
-from factory.floor.layout.guidepath import Box
+from factory.support.boxes import Box
 from factory.support.errors import Diagnostic, Position
 from factory.support.showing import Told
 from factory.theory.nets.coordinated import Past
@@ -49,6 +49,16 @@ class Region:
     z: tuple[float, float]
     label: str = ""
     mode: int = ALWAYS
+
+    @property
+    def is_payload(self) -> bool:
+        """Whether it is swept by what a robot carries."""
+        return self.kind == PAYLOAD_BODY
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether its robot is there in the mode of one operation only."""
+        return self.mode != ALWAYS
 
     def named(self, factory: Factory) -> str:
         """The region in words."""

@@ -10,9 +10,10 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 from xml.etree.ElementTree import Element
 
-from factory.floor.layout.guidepath import Feeder, Point2
+from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hands.hand import Hand
 from factory.support.arrays import Array, Index
+from factory.support.boxes import Point2
 
 
 class JointCurves(Protocol):

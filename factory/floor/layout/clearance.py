@@ -17,7 +17,7 @@ from factory.floor.layout.dimensions import BELT_GAP, FINGER_LOW, FINGER_TOP, PA
 from factory.floor.layout.exclusions import exclusions
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.meeting import collisions, meeting_faults
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import piles_of, regions
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP
 
 MOST = 100
@@ -31,8 +31,8 @@ def certify(layout: Layout) -> Certificate:
     Args:
         layout: the layout.
     """
-    factory, by_label = layout.factory, piles(layout.factory, layout.product)
-    swept, apart = regions(layout, by_label), Exclusions()
+    factory, by_label = layout.factory, piles_of(layout)
+    swept, apart = regions(layout), Exclusions()
     faults = [*islice(embedding_faults(layout), MOST)]
     if not faults:  # what the net says nothing about comes first: it is found at once
         faults += islice(chain(meeting_faults(layout, by_label), collisions(layout)), MOST)

@@ -16,10 +16,12 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from factory.floor.layout.branches import carriers, delivery
 from factory.floor.layout.certificate import Fault, fault
-from factory.floor.layout.guidepath import Guidepath, Point2
-from factory.floor.layout.layout import Layout, carriers, delivery
+from factory.floor.layout.guidepath import Guidepath
+from factory.floor.layout.layout import Layout
 from factory.support.arrays import Index
+from factory.support.boxes import Point2
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART
 

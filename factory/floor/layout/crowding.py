@@ -14,6 +14,7 @@ from itertools import islice
 import numpy as np
 import shapely
 
+from factory.floor.layout.branches import delivery
 from factory.floor.layout.certificate import (
     ALWAYS,
     HAND_BODY,
@@ -28,10 +29,10 @@ from factory.floor.layout.certificate import (
 )
 from factory.floor.layout.clearance import MOST
 from factory.floor.layout.crossings import embedding_faults, near
-from factory.floor.layout.guidepath import Box
-from factory.floor.layout.layout import Layout, delivery
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.meeting import TOLERANCE, meeting_faults
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import piles_of, regions
+from factory.support.boxes import Box
 from factory.theory.problem.ids import OperationId
 
 
@@ -46,8 +47,8 @@ def separation(one: Box, other: Box) -> float:
 
 def crowding_faults(layout: Layout) -> list[Fault]:
     """What is wrong with a layout as far as can be told without its net."""
-    by_label, crowding = piles(layout.factory, layout.product), Crowding(layout)
-    pairs = crowding.crowded(regions(layout, by_label))
+    by_label, crowding = piles_of(layout), Crowding(layout)
+    pairs = crowding.crowded(regions(layout))
     return [
         *islice(embedding_faults(layout), MOST),
         *islice((crowding.fault(*pair) for pair in pairs), MOST),

@@ -8,8 +8,8 @@ payloads.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
 
+from factory.support.decimals import up
 from factory.theory.problem.robot_bodies import CARRIAGE, MAST
 
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
@@ -68,11 +68,6 @@ SLOT = 0.001
 BELT_GAP = 3e-4
 """The outfeed lies this much below z0, so that the output robot brings its product without
 touching."""
-
-
-def up(length: float) -> float:
-    """The next whole millimetre [m]: rounding up keeps things apart."""
-    return ceil(length * 1000 - 1e-6) / 1000
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from math import floor, inf
 
 from factory.floor.geometry.solids import Product
 from factory.floor.geometry.turning import fed_of
+from factory.floor.layout.branches import carriers, delivery
 from factory.floor.layout.certificate import (
-    ALWAYS,
     ARM_BODY,
     CARRIAGE_BODY,
     MAST_BODY,
@@ -18,14 +18,16 @@ from factory.floor.layout.certificate import (
     SHED,
     Region,
 )
-from factory.floor.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
-from factory.floor.layout.guidepath import Box, Guidepath
+from factory.floor.layout.dimensions import BEHIND, SIDE, WALL, Clearance
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Point3
-from factory.floor.layout.layout import Layout, carriers, delivery
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import Shape, headings
 from factory.floor.layout.stretching import Stretched
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
 from factory.floor.layout.visits import visits_of
+from factory.support.boxes import Box
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 
 
@@ -115,9 +117,9 @@ def _spare(layout: Layout) -> float:
     c, spare = layout.clearance, inf
     swept = [
         region
-        for region in regions(layout, piles(layout.factory, layout.product))
+        for region in regions(layout)
         if region.kind not in (OUTFEED, SHED)
-        and (region.robot != 0 or region.mode == ALWAYS)
+        and (region.robot != 0 or not region.is_coupled)
         and not _runs_under(region)
     ]
     for start, _, low, high in (layout.outfeed, layout.shed):

@@ -52,32 +52,30 @@ class Pace(SpeedProfile):
         """Time at which a robot enters its goal ball that comes to rest at `rested` [s]."""
         return max(rested - sqrt(2 * self.eps / self.acceleration), 0.0)
 
+    def gear_times(self, layout: Layout) -> list[float]:
+        """For each robot the summed delays [s] of its gear in a layout, a unit: the greatest is the
+        cycle time, where every robot has one tour. Where a robot goes ahead while it waits, it
+        takes the longer of that and the operation."""
+        ways, operations = _ways(layout), layout.factory.operations
+        delays = operation_times(layout, self)
 
-def gear_times(layout: Layout, pace: Pace) -> list[float]:
-    """For each robot the summed delays [s] of its gear, a unit: the greatest is the cycle time,
-    where every robot has one tour. Where a robot goes ahead while it waits, it takes the longer of
-    that and the operation."""
-    ways, operations = _ways(layout), layout.factory.operations
-    delays = operation_times(layout, pace)
+        def taken(number: int, robot: int) -> float:
+            operation = operations[number]
+            if self.ahead is None or not operation.awaits_empty(operation.robots.index(robot)):
+                return delays[number]
+            on_path = self.on(layout.guidepaths[robot])
+            return max(delays[number], on_path.rest(ways[number, robot]) + self.ahead)
 
-    def taken(number: int, robot: int) -> float:
-        operation = operations[number]
-        if pace.ahead is None or not operation.awaits_empty(operation.robots.index(robot)):
-            return delays[number]
-        on_path = pace.on(layout.guidepaths[robot])
-        return max(delays[number], on_path.rest(ways[number, robot]) + pace.ahead)
+        units = layout.factory.period
+        return [
+            sum(taken(n, robot.index) for n in robot.operations) / units
+            for robot in layout.factory.robots
+        ]
 
-    units = layout.factory.period
-    return [
-        sum(taken(n, robot.index) for n in robot.operations) / units
-        for robot in layout.factory.robots
-    ]
-
-
-def cycle_of(layout: Layout, pace: Pace) -> float:
-    """The cycle time of a layout [s]: the greatest gear time, where every robot has one tour; else
-    the maximum cycle ratio of its gear train."""
-    return slowest(layout, pace)[0]
+    def cycle_of(self, layout: Layout) -> float:
+        """The cycle time of a layout [s]: the greatest gear time, where every robot has one tour;
+        else the maximum cycle ratio of its gear train."""
+        return slowest(layout, self)[0]
 
 
 def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
@@ -85,7 +83,7 @@ def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
     train those on the critical circuit, first those that spend most of it."""
     net = layout.factory.net
     if net.is_tree:
-        times = gear_times(layout, pace)
+        times = pace.gear_times(layout)
         robot = max(range(len(times)), key=times.__getitem__)
         return times[robot], [robot]
     delays, legs = operation_times(layout, pace), _ways(layout)

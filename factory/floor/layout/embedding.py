@@ -13,19 +13,20 @@ from itertools import permutations
 from math import ceil
 
 from factory.floor.geometry.solids import Product
-from factory.floor.layout.certificate import ALWAYS, LOADS, Certificate, Fault, Region
+from factory.floor.layout.certificate import LOADS, Certificate, Fault, Region
 from factory.floor.layout.clearance import certify
-from factory.floor.layout.dimensions import Clearance, up
+from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.exclusions import crowded
 from factory.floor.layout.fork import NO_ARMS, forked
-from factory.floor.layout.guidepath import Point2, hull
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.optimising import bounds, optimised
 from factory.floor.layout.way import rounding_for
 from factory.floor.mating.mating import judged
+from factory.support.boxes import Point2, hull
+from factory.support.decimals import up
 from factory.support.errors import Diagnostic, RunError
 from factory.theory.compiler.tees import on_stems
 from factory.theory.plant.factory import Factory
@@ -98,7 +99,7 @@ def _parted(layout: Layout, certificate: Certificate) -> dict[int, float]:
         stem = len(pair) == 2 and layout.share_stem(*pair)
         for robot, other in permutations(pair) if len(pair) == 2 and not stem else ():
             path = layout.guidepaths[robot]
-            loads = [r.box for r in carried if r.robot == robot and r.mode == ALWAYS]
+            loads = [r.box for r in carried if r.robot == robot and not r.is_coupled]
             passing = [r.box for r in carried if r.robot == other]
             if loads and passing:
                 further = path.frame(hull(loads))[1] - path.frame(hull(passing))[0]

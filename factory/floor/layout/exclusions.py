@@ -55,7 +55,11 @@ ROUNDS = 8
 
 
 def coordinated(layout: Layout) -> Coordinated:
-    """The coordinated net of a layout, with everything that keeps its machines apart; made once."""
+    """The coordinated net of a layout, with everything that keeps its machines apart; made once.
+
+    Args:
+        layout: the layout.
+    """
     return layout.kept(_coordinated)
 
 

@@ -19,8 +19,9 @@ from factory.floor.layout.dimensions import (
     SIDE,
     Clearance,
 )
-from factory.floor.layout.guidepath import Extent, Feeder, hull
+from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.layout import Layout
+from factory.support.boxes import Extent, hull
 from factory.theory.plant.operation import Operation
 
 

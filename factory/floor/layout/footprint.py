@@ -13,10 +13,11 @@ from functools import cached_property
 from itertools import accumulate
 from math import inf
 
-from factory.floor.layout.dimensions import PAYLOADS, POST, SIDE, Clearance, up
-from factory.floor.layout.guidepath import Extent, hull
+from factory.floor.layout.dimensions import PAYLOADS, POST, SIDE, Clearance
 from factory.floor.layout.shapes import Shape
 from factory.floor.layout.stops import Stop, stops_of
+from factory.support.boxes import Extent, hull
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.robot_bodies import MAST

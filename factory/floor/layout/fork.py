@@ -14,19 +14,20 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from factory.floor.layout.bending import Detour, bent
+from factory.floor.layout.branches import branch_of, carriers
 from factory.floor.layout.certificate import (
-    ALWAYS,
     ARM_BODY,
     CARRIAGE_BODY,
     MAST_BODY,
 )
 from factory.floor.layout.clearance import certify
-from factory.floor.layout.dimensions import ARMS, CARRIAGES, up
-from factory.floor.layout.guidepath import Extent
+from factory.floor.layout.dimensions import ARMS, CARRIAGES
 from factory.floor.layout.hands.leaving import SPARE
-from factory.floor.layout.layout import Layout, branch_of, carriers
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.layout import Layout
+from factory.floor.layout.sweeps import regions
 from factory.floor.layout.way import Bend
+from factory.support.boxes import Extent
+from factory.support.decimals import up
 from factory.support.errors import Diagnostic, RunError
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.robot_bodies import MAST
@@ -155,12 +156,12 @@ def _beside(layout: Layout, robot: int) -> Iterator[tuple[int, Extent]]:
     half = layout.factory.carriage / 2
     yield CARRIAGES, (-path.reach - half, half - path.reach, lane - half, lane + half)
     yield ARMS, (-path.reach - MAST / 2, -path.arm, lane - MAST / 2, lane + MAST / 2)
-    for region in regions(layout, piles(layout.factory, layout.product)):
+    for region in regions(layout):
         is_robots = region.robot == robot and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)
         if (
             region.robot in branch
             and not is_robots
-            and (region.robot != robot or region.mode == ALWAYS)
+            and (region.robot != robot or not region.is_coupled)
         ):
             xlo, xhi, ylo, yhi = region.box
             yield region.layer, path.frame((xlo - x, xhi - x, ylo - y, yhi - y))

@@ -20,7 +20,6 @@ from factory.floor.geometry.suction import (
     pad_place,
     terrains_of,
 )
-from factory.floor.geometry.turning import presented
 from factory.floor.layout.dimensions import PAD, PAYLOAD
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
 from factory.floor.layout.guidepath import Guidepath
@@ -164,4 +163,4 @@ def _path(outlet: Outlet) -> Guidepath:
 
 
 def _solid(outlet: Outlet) -> Solid:
-    return presented(outlet.layout.product.solids[outlet.label])
+    return outlet.layout.product.solids[outlet.label].presented()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -11,12 +11,14 @@ from types import MappingProxyType
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.certificate import Certificate
 from factory.floor.layout.chains import Chains, JointCurves
-from factory.floor.layout.dimensions import BEHIND, BELT_GAP, PAYLOAD, PLAY, SIDE, TRAY, WALL, up
-from factory.floor.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hull, moved
+from factory.floor.layout.dimensions import BEHIND, BELT_GAP, PAYLOAD, PLAY, SIDE, TRAY, WALL
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.mounted import Mount, grip_of
 from factory.floor.layout.visits import LEAST, Visit, Visits, beyond_station, stop_offset
 from factory.floor.layout.way import Ways
+from factory.support.boxes import Box, Extent, Point2, hull, moved
+from factory.support.decimals import up
 from factory.support.keeping import Keeping
 from factory.support.showing import Pictured
 from factory.theory.plant.approaches import Overlap
@@ -318,33 +320,3 @@ class Layout(Keeping, Pictured):
 def _grip(layout: Layout, robot: int) -> Extent | None:
     hand = layout.hand(robot)
     return None if hand is None else grip_of(hand, layout.mount(robot))
-
-
-def carriers(factory: Factory) -> list[int]:
-    """For each robot the carrier on whose guidepath its own ends: the one it delivers to, or that
-    of a fixed robot which takes what it brings; -1 for the output robot."""
-    ends = (delivery(factory, robot.index) for robot in factory.robots)
-    return [-1 if factory.drops(o.index) else o.carrier for o in ends]
-
-
-def branch_of(on: Sequence[int], robot: int) -> list[int]:
-    """A robot (index) and all robots that bring it something, carriers first; `on`: the
-    `carriers`."""
-    branch = [robot]
-    for other, carrier in enumerate(on):  # carriers come first
-        if carrier in branch:
-            branch.append(other)
-    return branch
-
-
-def delivery(factory: Factory, robot: int) -> Operation:
-    """The operation at whose station the guidepath of a robot (index) ends: its last, or that of a
-    fixed robot which takes what it brings."""
-    while True:
-        last = factory.last(robot)
-        if last.carrier == robot or factory.robots[last.carrier].travels:
-            return last
-        robot = last.carrier
-
-
-__all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

@@ -19,13 +19,13 @@ from factory.floor.layout.dimensions import (
     WALL,
 )
 from factory.floor.layout.feeding import Outlet, lines_of, outlets_of
-from factory.floor.layout.guidepath import Box
 from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.outfeed import dip_of, slot_of, slotted, table
 from factory.floor.layout.presence import ANY, STILL, UP, MachineBodies, Presence, boxed
 from factory.floor.layout.staying import Staying, in_world, station, upright
 from factory.support.arrays import Array
+from factory.support.boxes import Box
 
 
 def presences(

@@ -17,14 +17,14 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.certificate import Region
 from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.durations import Pace, cycle_of, gear_times
-from factory.floor.layout.guidepath import Box, Point2, hull
+from factory.floor.layout.durations import Pace
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import bare
-from factory.floor.layout.layout import Layout, carriers
+from factory.floor.layout.layout import Layout
 from factory.floor.layout.outline import Outline
 from factory.floor.layout.packing import WIDTHS, Packing, Task
 from factory.floor.layout.shapes import (
@@ -41,7 +41,8 @@ from factory.floor.layout.shapes import (
 )
 from factory.floor.layout.sides import admissible, admitted
 from factory.floor.layout.stretching import Stretched, outgoing, stretch
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
+from factory.support.boxes import Box, Point2, hull
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 
@@ -95,14 +96,14 @@ def optimised(
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)
     best = first_feasible(factory, product, c, wide, hands)
-    times = gear_times(best, pace)
-    least = _score(best, cycle_of(best, pace), floor)
+    times = pace.gear_times(best)
+    least = _score(best, pace.cycle_of(best), floor)
     for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):
         weights = task.weights if number < UNWEIGHTED else _weights(times)
         way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
         layout = _packed(way, product, payloads)
-        gear_seconds = gear_times(layout, pace)
-        score = _score(layout, cycle_of(layout, pace), floor)
+        gear_seconds = pace.gear_times(layout)
+        score = _score(layout, pace.cycle_of(layout), floor)
         if score < least:
             best, times, least = layout, gear_seconds, score
     return best
@@ -110,7 +111,7 @@ def optimised(
 
 def floor_of(layout: Layout) -> Box:
     """The floor that a layout takes."""
-    swept = regions(layout, piles(layout.factory, layout.product))
+    swept = regions(layout)
     return bounds(swept, layout.clearance)
 
 

@@ -19,11 +19,11 @@ from factory.floor.layout.dimensions import (
     WALL,
     Clearance,
 )
-from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.hands.limbs import limbs
 from factory.floor.layout.hands.surfaces import Body, Surfaces
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2
 from factory.support.settings import Settings
 from factory.theory.control.governed import GovernedAxis, Trajectory
 from factory.theory.control.profile import SpeedProfile

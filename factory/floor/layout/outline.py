@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from math import inf
 from operator import add
 
-from factory.floor.layout.dimensions import LAYERS, TOOL_TRAVEL, up
+from factory.floor.layout.dimensions import LAYERS, TOOL_TRAVEL
 from factory.floor.layout.footprint import Block, Footprint, Placed, Strip
-from factory.floor.layout.guidepath import hull
 from factory.floor.layout.shapes import Shape
+from factory.support.boxes import hull
+from factory.support.decimals import up
 
 NOWHERE: Block = (inf, -inf, inf, -inf)
 

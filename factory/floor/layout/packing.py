@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
 
-from factory.floor.layout.dimensions import PAYLOADS, Clearance, up
+from factory.floor.layout.dimensions import PAYLOADS, Clearance
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.footprint import Placed, extent_to, footprint
-from factory.floor.layout.guidepath import Extent
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.holding import bare
 from factory.floor.layout.layout import BESIDE
@@ -23,6 +22,8 @@ from factory.floor.layout.outline import Choice, Guest, Outline, outlined
 from factory.floor.layout.shapes import Shape, Sides
 from factory.floor.layout.skyline import Skyline
 from factory.floor.layout.stops import Stop
+from factory.support.boxes import Extent
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 

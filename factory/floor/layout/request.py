@@ -103,14 +103,13 @@ class Ground:
         """The layout of a compiled factory; `hands`: those to choose from, where they are known;
         `draft`: what was drafted for it with these hands. Raises RunError (Layout) where there is
         no room."""
-        from factory.floor.geometry.fused_bodies import repeated
         from factory.floor.layout.durations import Pace
         from factory.floor.layout.embedding import lay_out
         from factory.floor.mating.mating import judged
 
         self.check(factory.folded)
         pace = Pace.of(settings)
-        factory, product = judged(factory, product), repeated(product, factory)
+        factory, product = judged(factory, product), product.repeated(factory)
         hands = hands or hands_of(factory, product, settings)
         floor = None if self.tile else self.floor
         layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
@@ -123,23 +122,21 @@ class Ground:
     ) -> Layout:
         """The draft of the layout of a compiled factory with these hands: the best one found,
         before it is certified."""
-        from factory.floor.geometry.fused_bodies import repeated
         from factory.floor.layout.dimensions import Clearance
         from factory.floor.layout.durations import Pace
         from factory.floor.layout.embedding import drafted
         from factory.floor.mating.mating import judged
 
-        factory, product = judged(factory, product), repeated(product, factory)
+        factory, product = judged(factory, product), product.repeated(factory)
         c, pace = Clearance(settings.clearance, factory.carriage), Pace.of(settings)
         return drafted(factory, product, c, pace, self.floor, hands)
 
 
 def hands_of(factory: Factory, product: Product, settings: Settings) -> Hands:
     """The hands to choose from for a compiled factory."""
-    from factory.floor.geometry.fused_bodies import repeated
     from factory.floor.layout.hands.choosing import Hands
     from factory.floor.mating.mating import judged
     from factory.theory.compiler.tees import on_stems
 
     stems, _ = on_stems(judged(factory, product))
-    return Hands(stems, repeated(product, factory), settings.acceleration)
+    return Hands(stems, product.repeated(factory), settings.acceleration)

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.embedding import certified
-from factory.floor.layout.guidepath import Box, Guidepath
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.layout.visits import Visit
+from factory.support.boxes import Box
 from factory.support.errors import RunError
 from factory.theory.plant.factory import Factory
-
-LAID_FOR = ("clearance", "acceleration")
-"""The settings that a layout depends on: what is for others is laid out anew."""
 
 AXES = ((1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 """The ways that guidepaths head."""
@@ -29,6 +27,7 @@ class LayoutTable:
     """A layout as it is kept in a file, by the names that `Layout` has.
 
     Attributes:
+        LAID_FOR: the settings that a layout depends on: what is for others is laid out anew.
         clearance: least distance between machines [m].
         guidepaths: of each robot.
         visits: for each operation those of its robots.
@@ -39,6 +38,8 @@ class LayoutTable:
             product's own.
         tile: size of the tiles of a platen [m]; 0 without one.
     """
+
+    LAID_FOR: ClassVar[tuple[str, ...]] = ("clearance", "acceleration")
 
     clearance: float
     guidepaths: tuple[Guidepath, ...]
@@ -90,7 +91,7 @@ class LayoutTable:
         self._check(factory)
         laid = Layout(
             factory,
-            solids := repeated(product, factory),
+            solids := product.repeated(factory),
             self.clearance,
             self.guidepaths,
             self._visits(factory),

@@ -13,16 +13,16 @@ from factory.floor.layout.certificate import HAND_BODY, PAYLOAD_BODY, Region
 from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.sweeps import Pile, piles, regions
+from factory.floor.layout.sweeps import Pile, piles_of, regions
 from factory.theory.problem.pag import NOPART
 
 
 def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
     """The pairs (robot index, label) that the robot cannot carry back to B. Near linear."""
-    by_label = piles(layout.factory, layout.product)
+    by_label = piles_of(layout)
     robots = range(len(layout.factory.robots))
     ways = [way for robot in robots for way in _ways_back(layout, robot, by_label)]
-    here = [region for region in regions(layout, by_label) if region.layer == PAYLOADS]
+    here = [region for region in regions(layout) if region.layer == PAYLOADS]
     crowding, back = Crowding(layout), {id(way) for way in ways}
     barred = set[tuple[int, str]]()
     for one, other in crowding.near([*here, *ways]):

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from itertools import islice
 
-from factory.floor.geometry.fused_bodies import repeated
 from factory.floor.geometry.solids import Product
 from factory.floor.layout.bounds import least_times
 from factory.floor.layout.durations import Pace
@@ -42,7 +41,7 @@ def sequenced(
         factory = shared(forest, plan, catalogue)
         made = factory.sequence
         if not times:
-            solids, pace = repeated(product, factory), Pace.of(settings)
+            solids, pace = product.repeated(factory), Pace.of(settings)
             least = least_times(factory, solids, settings.clearance, pace)
             for o, time in zip(factory.operations, least, strict=True):
                 times.setdefault((made[o.turn], o.written), time)

@@ -7,14 +7,15 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
 from factory.floor.geometry.solids import Product
-from factory.floor.layout.dimensions import FINGER, PAYLOAD, Clearance, up
-from factory.floor.layout.guidepath import Box, Extent, Point2, hull, moved, project
+from factory.floor.layout.branches import carriers
+from factory.floor.layout.dimensions import FINGER, PAYLOAD, Clearance
 from factory.floor.layout.hands.choosing import Hands
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.mounted import Mount, grip_of
-from factory.floor.layout.layout import carriers
 from factory.floor.layout.stops import carried
 from factory.floor.layout.sweeps import piles
+from factory.support.boxes import Box, Extent, Point2, hull, moved, project
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import MAST

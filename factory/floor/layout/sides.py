@@ -8,9 +8,9 @@ robot.
 
 from __future__ import annotations
 
-from factory.floor.layout.guidepath import Point2
-from factory.floor.layout.layout import carriers
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.shapes import OUTPUT, Frame, Sides, turned
+from factory.support.boxes import Point2
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.pag import NOPART

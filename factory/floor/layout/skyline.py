@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
-from factory.floor.layout.dimensions import LAYERS, up
+from factory.floor.layout.dimensions import LAYERS
 from factory.floor.layout.footprint import Block
 from factory.floor.layout.outline import Outline
+from factory.support.decimals import up
 
 WINDOW = 16
 """So many blocks a layer are looked at; what was there before is a wall."""

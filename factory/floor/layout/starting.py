@@ -12,7 +12,12 @@ from factory.theory.nets.petri import Marking
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     """Every axis in a marking. A robot is where its last operation left it, or at its B end if it
     waits without a payload at the beginning of its cycle; then its lift is where its last tour left
-    it, unless it is adjusted by then or its hand is above what it takes."""
+    it, unless it is adjusted by then or its hand is above what it takes.
+
+    Args:
+        layout: the layout.
+        marking: a legal marking of its net.
+    """
     factory, net = layout.factory, layout.factory.net
     positions = np.zeros(len(factory.axes))
     for robot, gear in zip(factory.robots, net.gears, strict=True):

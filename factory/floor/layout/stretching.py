@@ -12,11 +12,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from factory.floor.layout.dimensions import LAYERS, PAYLOADS, Clearance, up
+from factory.floor.layout.dimensions import LAYERS, PAYLOADS, Clearance
 from factory.floor.layout.footprint import Footprint, Placed, footprint
 from factory.floor.layout.outline import Choice, Guest, Outline, outlined
 from factory.floor.layout.shapes import Shape, Sides
 from factory.floor.layout.stops import Stop
+from factory.support.decimals import up
 from factory.theory.plant.factory import Factory
 
 

@@ -38,12 +38,12 @@ from factory.floor.layout.dimensions import (
     SIDE,
 )
 from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.guidepath import Box, Extent, Point2, hull, moved
 from factory.floor.layout.hands.hand import ROOT
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.visits import Visit
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Extent, Point2, hull, moved
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, ARM_WIDTH, CARRIAGE_TOP, MAST
@@ -96,9 +96,23 @@ def _pile(product: Product, low: Array, high: Array) -> Pile:
     return Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))
 
 
-def regions(layout: Layout, by_label: Mapping[str, Pile]) -> list[Region]:
-    """Every region of a layout, robot by robot. Linear in the sum of the gears' lengths."""
-    result: list[Region] = []
+def piles_of(layout: Layout) -> Mapping[str, Pile]:
+    """The piles of a layout. Computed once."""
+    return layout.kept(_piles)
+
+
+def _piles(layout: Layout) -> Mapping[str, Pile]:
+    return piles(layout.factory, layout.product)
+
+
+def regions(layout: Layout) -> list[Region]:
+    """What robots, payloads and stations sweep, robot by robot. Linear in the sum of the gears'
+    lengths.
+
+    Args:
+        layout: the layout.
+    """
+    result, by_label = list[Region](), piles_of(layout)
     for robot in range(len(layout.factory.robots)):
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, by_label))

@@ -7,11 +7,11 @@ from math import ceil, floor
 import numpy as np
 import shapely
 
-from factory.floor.layout.guidepath import Box, Point2
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import ROUNDING
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
 from factory.support.arrays import Array
+from factory.support.boxes import Box, Point2
 
 SHIFTS = 12
 """So many places of the tiles' edges are tried along each axis."""
@@ -40,7 +40,7 @@ def _boxes(layout: Layout) -> Array:
     """The regions of a layout (n, 4) [m]."""
     occupied = layout.certificate.regions if layout.certificate else None
     if occupied is None:
-        occupied = tuple(regions(layout, piles(layout.factory, layout.product)))
+        occupied = tuple(regions(layout))
     return np.array([region.box for region in occupied])
 
 

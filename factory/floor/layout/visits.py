@@ -8,8 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from factory.floor.layout.guidepath import Guidepath, Point2
+from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Point3
+from factory.support.boxes import Point2
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 

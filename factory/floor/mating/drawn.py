@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry.decimation import ENOUGH, Coarse, decimated
-from factory.floor.geometry.meshes import Mesh, hull_of, is_closed, volume_of
+from factory.floor.geometry.meshes import Mesh, hull_of
 from factory.floor.geometry.overlap import (
     Common,
     bounded,
@@ -31,11 +31,13 @@ from factory.floor.geometry.overlap import (
     swept,
     united,
 )
-from factory.floor.geometry.solids import Product, rotation
+from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import ConvexBodies
 from factory.floor.mating.depth import solid_hull
 from factory.floor.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import is_closed, volume_of
+from factory.support.rotations import rotation
 
 ALIKE = 1e-6
 """Convex bodies are all of a mesh if their volumes differ by no more than this share."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, get_args
@@ -19,8 +20,15 @@ from factory.support.errors import Diagnostic, Position
 from factory.theory.plant.approaches import Approach, Clash, Kind
 from factory.theory.problem.pag import AllowedOverlap
 
-STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
-"""The levels, the strictest first."""
+
+class Level(IntEnum):
+    """How freely inputs come together, the strictest last."""
+
+    BLOCKED = 0
+    LEFT_OUT = 1
+    NO_DEEPER = 2
+    STRICT = 3
+
 
 LEVELS = ("none", "left_out", "no_deeper", "strict")
 """The names of the levels in documents."""

@@ -13,19 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.floor.geometry.solids import Product
-from factory.floor.mating.bodies import bodies
-from factory.floor.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT, Mating, Matings
+from factory.floor.mating.finder import Finder
+from factory.floor.mating.findings import Level, Mating, Matings
 from factory.floor.mating.meetings import Meeting, Meetings, meetings
-from factory.floor.mating.overlaps import Finder, Overlaps
+from factory.floor.mating.overlaps import Overlaps
 from factory.floor.mating.paths import SIGNS
-from factory.support.arrays import Indices
 from factory.support.errors import Position
 from factory.theory.compiler.expanding import Node, nodes_of
 from factory.theory.plant.approaches import MARGIN, Approach, Clash, Kind, Overlap, Pair
 from factory.theory.plant.factory import Factory
-
-UPRIGHT = 2
-"""The axis z, along which inputs are lowered."""
 
 
 def matings(
@@ -44,14 +40,14 @@ def matings(
     met = meetings(nodes, axes)
     if not met.all:
         return Matings((), {})
-    finder = Finder(bodies(product, met.parts), met, as_drawn)
+    finder = Finder(product, met, as_drawn)
     judge = _Judge(met, product, {label: node.last for label, node in nodes.items()})
     for axis in (0, 1):
         judge.slide(axis, finder.along(axis, met.axes == axis))
     asked = [lowered.get(meeting.label, "") for meeting in met.all]
-    unclean = (judge.slides.max(axis=1) < STRICT) | (np.array(asked) != "")
+    unclean = (judge.slides.max(axis=1) < Level.STRICT) | (np.array(asked) != "")
     if lifts and unclean.any():
-        judge.lower(finder.along(UPRIGHT, unclean), unclean)
+        judge.lower(finder.lowering(unclean), unclean)
     made = tuple(judge.mating(number, label) for number, label in enumerate(asked))
     return Matings(made, judge.contents(made))
 
@@ -75,23 +71,23 @@ class _Judge:
         self.meetings, self.product, self.at = met, product, at
         count = len(met.all)
         self.slides = np.zeros((count, 2), np.int64)
-        self.lowers = np.full((count, 2), BLOCKED)
+        self.lowers = np.full((count, 2), Level.BLOCKED)
         self.clashing = np.zeros((count, 2), np.int64)
         self.overlaps: dict[int, Overlaps] = {}
 
     def slide(self, axis: int, overlaps: Overlaps) -> None:
         """Note the levels along x or y."""
         at = self.meetings.axes == axis
-        levels, clashing = levels_of(overlaps, len(at))
+        levels, clashing = overlaps.levels(len(at))
         self.slides[at], self.clashing[at] = levels[at], clashing[at]
         self.overlaps[axis] = overlaps
 
     def lower(self, overlaps: Overlaps, tried: NDArray[np.bool_]) -> None:
         """Note the levels along z: column 0 if the first input is lowered, 1 if the last is."""
         either = np.array([m.either for m in self.meetings.all])
-        self.lowers[tried] = levels_of(overlaps, len(tried))[0][tried]
-        self.lowers[~either, 0] = BLOCKED
-        self.overlaps[UPRIGHT] = overlaps
+        self.lowers[tried] = overlaps.levels(len(tried))[0][tried]
+        self.lowers[~either, 0] = Level.BLOCKED
+        self.overlaps[Finder.UPRIGHT] = overlaps
 
     def mating(self, number: int, asked: str = "") -> Mating:
         """The best approach: that of the stricter level, or sliding if both are equal; lowering of
@@ -101,9 +97,9 @@ class _Judge:
         slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
         slide, lower = max(slides), max(self.lowers[number].tolist())
         column = 0 if asked == meeting.inputs[0] else 1
-        if asked and self.lowers[number, column] > BLOCKED:
+        if asked and self.lowers[number, column] > Level.BLOCKED:
             approach = self._lowered(number, column)
-        elif slide == lower == BLOCKED:
+        elif slide == lower == Level.BLOCKED:
             column = clashing.index(min(clashing))
             clashes = self._clashes(number, meeting.axis, column, "clashing")
             other = self._clashes(number, meeting.axis, 1 - column, "clashing")
@@ -132,9 +128,9 @@ class _Judge:
         """Lowering of the first input (0) or the last (1)."""
         meeting = self.meetings.all[number]
         stroke = self._strokes(meeting)
-        overlaps = self._overlaps(number, UPRIGHT, column)
+        overlaps = self._overlaps(number, Finder.UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
-        clashes = self._clashes(number, UPRIGHT, column, "cutting")
+        clashes = self._clashes(number, Finder.UPRIGHT, column, "cutting")
         both = overlaps, overlaps
         return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], both, clashes)
 
@@ -201,20 +197,3 @@ class _Judge:
             if mating.approach.kind == "blocked":
                 parts[meeting.inputs[0]], parts[meeting.inputs[-1]] = self._sides(meeting)
         return parts
-
-
-def levels_of(overlaps: Overlaps, count: int) -> tuple[Indices, Indices]:
-    """The level of each meeting from each side (count, 2), and how many pairs clash there."""
-    clashing, deeper, faulty = (
-        np.stack(
-            [np.bincount(overlaps.meeting[fault[:, side]], minlength=count) for side in (0, 1)],
-            axis=1,
-        )
-        for fault in (overlaps.clashing, overlaps.deeper, overlaps.depths.faulty)
-    )
-    conditions = [faulty == 0, deeper == 0, clashing == 0]
-    return np.select(conditions, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing
-
-
-AMPLE = 5e-3
-"""More room than this [m] is not measured."""

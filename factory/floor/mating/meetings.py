@@ -48,6 +48,12 @@ class Meetings:
     levels: Indices = field(repr=False)
     """(meetings,): how deep in the tree each is."""
 
+    @classmethod
+    def at_once(cls, parts: tuple[str, ...]) -> Meetings:
+        """Of parts that all meet in one operation."""
+        every = Meeting("", (), 0, 0, 0, len(parts), either=True)
+        return cls(parts, (every,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
+
     @cached_property
     def axes(self) -> Indices:
         """The axis of each meeting (meetings,)."""

@@ -26,7 +26,7 @@ from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
 from factory.theory.problem.ids import OperationId, PlaceId, RobotId, TransitionId, end_of
 from factory.theory.problem.pag import NOPART, PAG
-from factory.theory.problem.plan import NOBODY, Plan, in_turn, out_of_turn
+from factory.theory.problem.plan import Plan, in_turn, out_of_turn
 from factory.theory.problem.robot_types import LIFT, Catalogue
 
 
@@ -186,21 +186,21 @@ def shared(base: Factory, plan: Plan, catalogue: Catalogue) -> Factory:
     tours = range(len(base.robots))
     if any(len(turn) != len(tours) for turn in plan.turns):
         raise _bad(f"each turn must name a robot for each of {len(tours)} tours")
-    if any(max(turn) == NOBODY for turn in plan.turns):
+    if any(max(turn) == Plan.NOBODY for turn in plan.turns):
         raise _bad("a turn makes no product")
     every = range(1 + max(map(max, plan.turns)))
     for turn in plan.turns:
         for o in base.operations:
             does = {turn[robot] for robot in o.robots}
             together = does | {turn[base.dropoffs[o.turn].carrier]}
-            if NOBODY in together and len(together) > 1:
+            if Plan.NOBODY in together and len(together) > 1:
                 raise _bad(f"nobody does some of the tours of '{base.products[o.turn]}' in a turn")
-            if NOBODY not in does and len(does) < len(o.robots):
+            if Plan.NOBODY not in does and len(does) < len(o.robots):
                 raise _bad(f"a robot cannot take two parts in '{o.label}'")
             lines = [robot for robot in o.robots if not base.robots[robot].body.first.moves]
             if o.carrier in lines and any(turn[robot] < turn[o.carrier] for robot in lines):
                 raise _bad(f"in '{o.label}' a robot comes to one that is numbered after it")
-    busy = {robot for turn in plan.turns for robot in turn} - {NOBODY}
+    busy = {robot for turn in plan.turns for robot in turn} - {Plan.NOBODY}
     if len(busy) < len(every):
         raise _bad(f"{len(every)} robots are named, and {len(busy)} have tours")
     lifts = plan.lifts or frozenset()
@@ -220,7 +220,7 @@ def with_crew(
     robot r of `base`. The type of each fits all its tours, and has a lift for those of `lifts`."""
     crew = dict[int, Robot]()
     for tour, robot in enumerate(base.robots):
-        for n in dict.fromkeys(turn[tour] for turn in turns if turn[tour] != NOBODY):
+        for n in dict.fromkeys(turn[tour] for turn in turns if turn[tour] != Plan.NOBODY):
             kind = crew[n].type if n in crew else robot.type
             kind = catalogue.meet(kind, robot.type) or kind
             of = crew.get(n, robot)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from factory.support.errors import Position
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART, PAG, Assembly
-from factory.theory.problem.plan import AS_WRITTEN, THIRD, Plan
+from factory.theory.problem.plan import AS_WRITTEN, Plan
 from factory.theory.problem.template import Template
 
 RELAY = "relay"
@@ -24,8 +24,14 @@ last of them is written."""
 class Node:
     """An operation to compile: a node of the PAG, or one pile of a node with many inputs.
 
-    `size` counts the operation instances of its subtree, itself included; `last`: where its last
-    input is written.
+    Attributes:
+        label: what it makes.
+        template: its template.
+        inputs: the labels of its inputs.
+        dwell: how long it takes at its goals [s].
+        size: number of operation instances of its subtree, itself included.
+        position: where it is written.
+        last: where its last input is written.
     """
 
     label: str
@@ -46,7 +52,13 @@ class Node:
 def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN) -> dict[str, Node]:
     """The operation instances by label, each after its inputs, the product last. Inputs beyond
     those of a template are inserted one by one: `x = mate(a, b, c)` becomes `x/2 = mate(a, b)`,
-    `x = insert(x/2, c)`. Joins have the forms of the plan, and what it hands over is relayed."""
+    `x = insert(x/2, c)`.
+
+    Args:
+        pag: the product.
+        templates: the operations, by name.
+        plan: joins have its forms, and what it hands over is relayed.
+    """
     nodes: dict[str, Node] = {}
     for assembly in pag.postorder():
         for label, template, inputs, last in _operations(assembly, templates, plan.forms):
@@ -143,10 +155,10 @@ def _operations(
     for number in range(taken, count + 1):
         label = assembly.label if number == count else f"{assembly.label}/{number}"
         inputs = assembly.inputs[:taken] if number == taken else (pile, assembly.inputs[number - 1])
-        form = THIRD if number == taken else 0
+        form = Plan.THIRD if number == taken else 0
         if template.instead and count > 1:
             form = forms.get(label, form)
-        if form == THIRD:
+        if form == Plan.THIRD:
             of = chosen = template
         elif number > taken and form == 0 and of.further:
             chosen = templates[of.further]

@@ -20,7 +20,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.theory.compiler.folding import begun_by, kind_of, sides_of
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART, Mix
-from factory.theory.problem.plan import NOBODY, Turns
+from factory.theory.problem.plan import Plan, Turns
 from factory.theory.problem.robot_types import Catalogue
 
 NECKLACES = 8
@@ -38,7 +38,7 @@ def turns_of(forest: Factory, on: Sequence[int], sequence: Sequence[str]) -> Tur
     unit = {product: number for number, product in enumerate(forest.sequence)}
     makes = {int(robot): o.turn for o in forest.operations for robot in o.robots}
     return [
-        [line if makes[robot] == unit[product] else NOBODY for robot, line in enumerate(on)]
+        [line if makes[robot] == unit[product] else Plan.NOBODY for robot, line in enumerate(on)]
         for product in sequence
     ]
 

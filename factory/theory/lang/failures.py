@@ -14,10 +14,10 @@ from typing import get_args
 
 from lark import Token
 
+from factory.support.decimals import number
 from factory.support.errors import did_you_mean
-from factory.theory.lang.source import Findings, quoted
+from factory.support.texts import Findings, quoted
 from factory.theory.lang.template_syntax import FailureCase, Words
-from factory.theory.lang.words import number
 from factory.theory.problem.template import Failure, Kind, Response, Test
 
 TIMES = 1000

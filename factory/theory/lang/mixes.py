@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from lark import Token
 
 from factory.support.settings import MOST_UNITS
-from factory.theory.lang.source import Findings, quoted, where
+from factory.support.texts import Findings, quoted, where
 from factory.theory.lang.statements import MixStatement, Statements
 from factory.theory.problem.pag import Assembly, Mix
 

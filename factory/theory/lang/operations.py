@@ -13,13 +13,14 @@ from typing import TypeGuard
 
 from lark import Token
 
+from factory.support.decimals import UNITS, is_number
 from factory.support.errors import Position, did_you_mean
 from factory.support.settings import DWELL
-from factory.theory.lang.source import Findings, near_file, quoted, where
+from factory.support.texts import Findings, near_file, quoted, where
 from factory.theory.lang.statements import Definition, Keyword
 from factory.theory.lang.turns import quaternion_of
 from factory.theory.lang.values import GEOMETRY, WRITTEN, Kind, ValueReader, kind_of
-from factory.theory.lang.words import LABEL_HINT, UNITS, is_label, is_number
+from factory.theory.lang.words import LABEL_HINT, is_label
 from factory.theory.problem.pag import RESERVED, SHAPES, Assembly, Parameter
 from factory.theory.problem.template import Template
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Sequence
 
+from factory.support.decimals import UNITS, number
 from factory.support.errors import usage_error
-from factory.theory.lang.words import UNITS, number
 from factory.theory.problem.pag import ANY_DEPTH, AllowedOverlap
 
 HINT = "for example a:b, a:b:0.5mm, or 0.5mm everywhere"

@@ -18,12 +18,14 @@ from itertools import chain, product, repeat
 from lark import Token
 
 from factory.support.collector import collector_paused
+from factory.support.decimals import UNITS, number
 from factory.support.errors import did_you_mean, usage_error
 from factory.support.guard import reading
+from factory.support.texts import Findings, quoted, source_of
 from factory.theory.lang.mixes import mix_of
 from factory.theory.lang.operations import AssemblyReader, signature
 from factory.theory.lang.pag_syntax import read_statements
-from factory.theory.lang.source import STDIN, Findings, quoted, read_text, source_of
+from factory.theory.lang.source import STDIN, read_text
 from factory.theory.lang.statements import (
     COPIES,
     CopiedLabel,
@@ -34,7 +36,6 @@ from factory.theory.lang.statements import (
     labels_of,
 )
 from factory.theory.lang.tree import TreeCheck
-from factory.theory.lang.words import UNITS, number
 from factory.theory.problem.pag import PAG, AllowedOverlap, Assembly
 from factory.theory.problem.template import Template
 
@@ -71,8 +72,16 @@ ALLOW_FORM = "write: allow ( peg, frame, 0.0005 ); or, for all pairs: allow ( 0.
 def read_pag(
     text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
-    """The PAG of a text. Mesh paths start at `folder`; they are not followed where that is None.
-    Raises InputError, also where its file or a mesh will be written over."""
+    """The PAG of a text.
+
+    Args:
+        text: the text.
+        templates: the operations that it may name, by name.
+        file: the name of its file.
+        folder: where mesh paths start; they are not followed where it is None.
+
+    Raises InputError, also where its file or a mesh will be written over.
+    """
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}

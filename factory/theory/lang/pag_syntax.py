@@ -14,6 +14,8 @@ from typing import Any
 
 from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
+from factory.support.decimals import UNITS
+from factory.support.texts import Findings, quoted
 from factory.theory.lang.pag_lessons import (
     FALLBACK,
     FALSE_MIX,
@@ -32,7 +34,6 @@ from factory.theory.lang.recovery import (
     report_unlawful,
     tokens_of,
 )
-from factory.theory.lang.source import Findings, quoted
 from factory.theory.lang.statements import (
     CopiedLabel,
     Definition,
@@ -46,7 +47,6 @@ from factory.theory.lang.statements import (
     WordPair,
     labels_of,
 )
-from factory.theory.lang.words import UNITS
 
 _SIGN_OR_WORD = re.compile(r"[\n=(),;]|[^\s=(),;]+")
 _WORD = re.compile(r"[\n;]|[^\s=(),;]+")

@@ -19,7 +19,7 @@ import lark
 from lark import Lark, Token, Transformer, UnexpectedToken
 
 from factory.support.cache import digest, load, store
-from factory.theory.lang.source import Findings, quoted
+from factory.support.texts import Findings, quoted
 
 END = "$END"
 UNLAWFUL = frozenset({"STRAY", "UNCLOSED"})

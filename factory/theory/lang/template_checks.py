@@ -8,10 +8,11 @@ from collections.abc import Mapping
 
 from lark import Token
 
+from factory.support.decimals import is_number, number
 from factory.support.errors import did_you_mean
 from factory.support.settings import DWELL
+from factory.support.texts import Findings, counted, quoted
 from factory.theory.lang.failures import FailureReader
-from factory.theory.lang.source import Findings, counted, quoted
 from factory.theory.lang.template_syntax import (
     Labels,
     ParameterClause,
@@ -20,7 +21,7 @@ from factory.theory.lang.template_syntax import (
     Words,
 )
 from factory.theory.lang.values import WRITTEN, ValueReader
-from factory.theory.lang.words import LABEL_HINT, is_label, is_number, number
+from factory.theory.lang.words import LABEL_HINT, is_label
 from factory.theory.problem.pag import NOPART, RESERVED, Value
 from factory.theory.problem.template import LOST, Failure, Law, Point, Template
 

@@ -16,7 +16,8 @@ from types import MappingProxyType
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.extensions import extension_folders
 from factory.support.resources import templates_folder
-from factory.theory.lang.source import Findings, quoted, read_text, source_of
+from factory.support.texts import Findings, quoted, source_of
+from factory.theory.lang.source import read_text
 from factory.theory.lang.template_checks import TemplateMaker
 from factory.theory.lang.template_syntax import read_clauses
 from factory.theory.problem.pag import NOPART
@@ -27,9 +28,15 @@ Folder = str | os.PathLike[str]
 
 @lru_cache(maxsize=256)
 def read_template(text: str, file: str = "<text>") -> Template:
-    """The template of a text. Raises InputError with every error of the text. `load_templates`
-    checks the templates named by `further`, `instead` and `brought`. A text is parsed once a
-    process."""
+    """The template of a text. `load_templates` checks the templates named by `further`, `instead`
+    and `brought`. A text is parsed once a process.
+
+    Args:
+        text: the text.
+        file: the name of its file.
+
+    Raises InputError with every error of the text.
+    """
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()
@@ -45,8 +52,13 @@ def is_shipped(template: Template) -> bool:
 
 
 def all_templates(folders: Sequence[Folder] = ()) -> Mapping[str, Template]:
-    """The templates of the user's folders, of entry points and the shipped ones. Raises
-    InputError."""
+    """The templates of the user's folders, of entry points and the shipped ones.
+
+    Args:
+        folders: those of the user, searched first.
+
+    Raises InputError.
+    """
     for folder in folders:
         if not Path(folder).is_dir():
             message = f"the templates folder '{folder}' is no directory"

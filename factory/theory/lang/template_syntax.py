@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from lark import Lark, Token, Transformer, v_args
 
 from factory.support.errors import did_you_mean
+from factory.support.texts import Findings, quoted, where
 from factory.theory.lang.recovery import (
     END,
     UNLAWFUL,
@@ -23,7 +24,6 @@ from factory.theory.lang.recovery import (
     report_unlawful,
     tokens_of,
 )
-from factory.theory.lang.source import Findings, quoted, where
 from factory.theory.lang.statements import Vector
 
 Words = Sequence[Token]

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from factory.support.decimals import is_number
 from factory.support.errors import Position, did_you_mean
+from factory.support.texts import Findings, quoted, where
 from factory.theory.lang.mixes import check_mix
-from factory.theory.lang.source import Findings, quoted, where
 from factory.theory.lang.statements import Statements
-from factory.theory.lang.words import LABEL_HINT, is_label, is_number
+from factory.theory.lang.words import LABEL_HINT, is_label
 from factory.theory.problem.pag import RESERVED, Assembly
 
 SUGGESTIONS = 20

@@ -10,11 +10,11 @@ from types import MappingProxyType
 
 from lark import Token
 
+from factory.support.decimals import is_number, number
 from factory.support.errors import Position, did_you_mean
+from factory.support.texts import Findings, quoted
 from factory.theory.lang.pag_syntax import spelled
-from factory.theory.lang.source import Findings, quoted
 from factory.theory.lang.statements import Vector
-from factory.theory.lang.words import is_number, number
 from factory.theory.problem.pag import Value
 
 

@@ -1,36 +1,12 @@
-"""Words of the languages: labels and numbers."""
+"""Labels, the words of the languages."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping
-from decimal import Decimal
-from types import MappingProxyType
-
-UNITS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254})
-"""The units of length [m]."""
 
 LABEL_HINT = "a label has letters, digits, '_', '-' and '.'"
 
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _LABEL = re.compile(r"[^\s+;,()=<>{}~\"/]+")
-
-
-def is_number(word: str) -> bool:
-    """Whether a word is written as a number: a sign, decimals and an exponent are allowed."""
-    return _NUMBER.fullmatch(word) is not None
-
-
-def number(word: str, unit: str = "m") -> float | None:
-    """The finite number of a word, converted to metres from `unit` as exactly as if it were written
-    in metres. None if it is not a number or overflows."""
-    if not is_number(word):
-        return None
-    value = float(word)
-    if unit != "m" and math.isfinite(value):
-        value = float(Decimal(word) * Decimal(repr(UNITS[unit])))
-    return value if math.isfinite(value) else None
 
 
 def is_label(word: str) -> bool:

@@ -126,7 +126,11 @@ def write_text(text: str) -> str:
 
 
 def write_template(template: Template) -> str:
-    """The canonical text of a template: one clause a line, written as the paper does."""
+    """The canonical text of a template: one clause a line, written as the paper does.
+
+    Args:
+        template: the template.
+    """
     failures = [*map(write_failure, template.failures)]
     defaults = ", ".join(f"{name} = {write_value(value)}" for name, value in template.parameters)
     parameters = ["geometry"] * template.geometry + [f"( {defaults} )"] * bool(defaults)

@@ -58,39 +58,26 @@ class Composition:
     closed: tuple[bool, ...]
     fitting: bool
 
-
-def compose(net: MarkedNet) -> Composition:
-    """Check the claim that `net.gears` compose the net into a gear net."""
-    closed = tuple(_is_cycle(net, gear) for gear in net.gears)
-    passing = [0] * len(net.net.transitions)
-    for gear in net.gears:
-        for event in gear.transitions:
-            if event >= 0:
-                passing[event] += 1
-    broken = (_unclosed(net, number) for number, good in enumerate(closed) if not good)
-    defects = [*islice(broken, MOST)]
-    defects += islice(_uncovered(net, passing), MOST)
-    defects += islice(_misplaced(net), MOST)
-    joints: tuple[Joint, ...] = ()
-    if not defects:
-        defects += islice(_shared(net, passing), MOST)
-    fitting = not defects
-    if fitting:
-        joints, defects = _tree(net)
-    return Composition(joints, tuple(defects), closed, fitting)
-
-
-def no_gear_net(
-    kind: str,
-    reason: str,
-    gears: Iterable[int] = (),
-    places: Iterable[int] = (),
-    transitions: Iterable[int] = (),
-) -> Defect:
-    """A defect that makes a net no gear net. Each gear is named once."""
-    return Defect(
-        "gear_net", kind, reason, tuple(dict.fromkeys(gears)), tuple(places), tuple(transitions)
-    )
+    @classmethod
+    def of(cls, net: MarkedNet) -> Composition:
+        """Check the claim that `net.gears` compose the net into a gear net."""
+        closed = tuple(_is_cycle(net, gear) for gear in net.gears)
+        passing = [0] * len(net.net.transitions)
+        for gear in net.gears:
+            for event in gear.transitions:
+                if event >= 0:
+                    passing[event] += 1
+        broken = (_unclosed(net, number) for number, good in enumerate(closed) if not good)
+        defects = [*islice(broken, MOST)]
+        defects += islice(_uncovered(net, passing), MOST)
+        defects += islice(_misplaced(net), MOST)
+        joints: tuple[Joint, ...] = ()
+        if not defects:
+            defects += islice(_shared(net, passing), MOST)
+        fitting = not defects
+        if fitting:
+            joints, defects = _tree(net)
+        return cls(joints, tuple(defects), closed, fitting)
 
 
 def _is_cycle(net: MarkedNet, gear: Gear) -> bool:
@@ -112,7 +99,7 @@ def _unclosed(net: MarkedNet, number: int) -> Defect:
     places, events = gear.places, gear.transitions
     if len(places) < 2:
         text = f"{called} has fewer than two places: such a gear is dead (Definition 3.4)"
-        return no_gear_net("1-gear", text, [number], places)
+        return Defect.no_gear_net("1-gear", text, [number], places)
     for place, a, b in zip(places, events, events[1:] + events[:1], strict=False):
         if a >= 0 and net.left[place] == a and net.right[place] == b:
             continue
@@ -121,13 +108,13 @@ def _unclosed(net: MarkedNet, number: int) -> Defect:
         kind = "missing consumer" if net.right[place] == NONE else "unclosed gear"
         if net.left[place] == NONE:
             kind, text = "missing producer", f"{text}: nothing marks it"
-        return no_gear_net(kind, text, [number], [place])
+        return Defect.no_gear_net(kind, text, [number], [place])
     if len(places) != len(events):
         text = f"{called} has {len(places)} places but {len(events)} transitions"
-        return no_gear_net("unclosed gear", text, [number], places[:1])
+        return Defect.no_gear_net("unclosed gear", text, [number], places[:1])
     twice = [p for p, count in Counter(places).items() if count > 1]
     text = f"{called} is no cycle: it runs through a place or a transition twice"
-    return no_gear_net("unclosed gear", text, [number], twice or places[:1])
+    return Defect.no_gear_net("unclosed gear", text, [number], twice or places[:1])
 
 
 def _event(net: MarkedNet, event: int) -> str:
@@ -149,11 +136,11 @@ def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
             text = f"place {at.name} = {notation(net, place)} is in no gear"
             beside = [q for e in at.left + at.right for q in net.net.preset[e] + net.net.postset[e]]
             near = sorted({gear for q in beside for gear in net.owners[q]})
-            yield no_gear_net("place in no gear", text, near, [place])
+            yield Defect.no_gear_net("place in no gear", text, near, [place])
     for event, count in enumerate(passing):
         if not count:
             text = f"transition {net.net.transitions[event].name} is in no gear"
-            yield no_gear_net("transition in no gear", text, transitions=[event])
+            yield Defect.no_gear_net("transition in no gear", text, transitions=[event])
 
 
 def _misplaced(net: MarkedNet) -> Iterator[Defect]:
@@ -165,7 +152,7 @@ def _misplaced(net: MarkedNet) -> Iterator[Defect]:
                 f"place {at.name} acts on {at.size} robots with slots for {named(net, slots)},"
                 f" but the gears through it are those of {named(net, owners)}"
             )
-            yield no_gear_net("slots", text, owners, [place])
+            yield Defect.no_gear_net("slots", text, owners, [place])
 
 
 def named(net: MarkedNet, gears: Iterable[int]) -> str:
@@ -196,13 +183,13 @@ def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
             kind, places = "two gears cross twice", tuple(p for p in places if len(owners[p]) > 1)
             both = f"the place before {called} and the one after it"
             text = f"gears {named(net, gears)} cross twice: they share {both}"
-        yield no_gear_net(kind, text, gears, places, [shared])
+        yield Defect.no_gear_net(kind, text, gears, places, [shared])
 
 
 def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Defect]]:
     """A breadth-first search over gears and shared places, which must form a tree."""
     if not net.gears:
-        return (), [no_gear_net("no gear", "the net has no gears")]
+        return (), [Defect.no_gear_net("no gear", "the net has no gears")]
     owners, entry = net.owners, [*map(int, [NONE] * len(net.gears))]
     seen = bytearray(len(net.gears))
     seen[0], order = 1, [0]
@@ -219,7 +206,7 @@ def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Defect]]:
     if len(order) < len(net.gears):
         apart = [g for g, hit in enumerate(seen) if not hit]
         text = f"gears {named(net, apart)} share no place with the rest, directly or not"
-        return (), [no_gear_net("gears apart", text, apart)]
+        return (), [Defect.no_gear_net("gears apart", text, apart)]
     return _joints(net, order, entry)
 
 
@@ -236,7 +223,7 @@ def _ring(net: MarkedNet) -> Defect:
     text = f"gears {named(net, gears)} form a ring through {names}: some circuit is no gear"
     if len(gears) == 2:
         text = f"gears {named(net, gears)} cross twice: they share {names}"
-    return no_gear_net("two gears cross twice", text, gears, places)
+    return Defect.no_gear_net("two gears cross twice", text, gears, places)
 
 
 def _joints(
@@ -254,7 +241,7 @@ def _joints(
             a, b = net.left[place], net.right[place]
             if there[c] and len(gear.places) > 2:
                 text = f"no transition c of {gear.robot} alone leads to {_event(net, a)}"
-                return (), [no_gear_net("missing producer", text, [number], [place])]
+                return (), [Defect.no_gear_net("missing producer", text, [number], [place])]
             joints.append(Joint(number, place, a, b, None if there[c] else c))
         for event in gear.transitions:
             there[event] = 1

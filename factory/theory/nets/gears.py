@@ -18,8 +18,11 @@ from factory.theory.problem.ids import PlaceId, TransitionId
 class Gear:
     """The cycle of places and transitions that is one robot's program (Definition 3.5).
 
-    `places[i]` leads from `transitions[i]` to `transitions[i + 1]`, cyclically; the first place is
-    `wait(nopart)`. `robot` is its name, r1, r2, ...; `type` the robot's type.
+    Attributes:
+        robot: its name, r1, r2, ...
+        type: the robot's type.
+        places: in their order, the first of which is `wait(nopart)`.
+        transitions: `places[i]` leads from `transitions[i]` to `transitions[i + 1]`, cyclically.
     """
 
     robot: str

@@ -31,6 +31,20 @@ class Defect:
     places: tuple[int, ...] = ()
     transitions: tuple[int, ...] = ()
 
+    @classmethod
+    def no_gear_net(
+        cls,
+        kind: str,
+        reason: str,
+        gears: Iterable[int] = (),
+        places: Iterable[int] = (),
+        transitions: Iterable[int] = (),
+    ) -> Defect:
+        """A defect that makes a net no gear net. Each gear is named once."""
+        return cls(
+            "gear_net", kind, reason, tuple(dict.fromkeys(gears)), tuple(places), tuple(transitions)
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Witness:
@@ -122,22 +136,23 @@ class Verdict(Told):
         holds: dict[str, object] = {name: getattr(self, name) for name in names}
         return {**holds, "method": self.method, "witness": [w.as_json() for w in self.witness]}
 
-
-def verdict(
-    net: MarkedNet,
-    defects: Iterable[Defect],
-    gear_train: bool | None,
-    sources: Mapping[str, Position] | None,
-    method: str = "structure",
-) -> Verdict:
-    """The verdict on a net with these defects: a property without defects holds, one whose defects
-    are all `undecided` is None. `sources`: source positions of robots by name."""
-    listed = tuple(defects)
-    kinds = {name: {d.kind for d in listed if d.property == name} for name in PROPERTIES}
-    holds = {name: None if k == {"undecided"} else not k for name, k in kinds.items()}
-    witness = tuple(_witness(net, defect, sources or {}) for defect in listed)
-    gears = net.gears
-    return Verdict(**holds, witness=witness, gears=gears, method=method, gear_train=gear_train)
+    @classmethod
+    def of(
+        cls,
+        net: MarkedNet,
+        defects: Iterable[Defect],
+        gear_train: bool | None,
+        sources: Mapping[str, Position] | None,
+        method: str = "structure",
+    ) -> Verdict:
+        """The verdict on a net with these defects: a property without defects holds, one whose
+        defects are all `undecided` is None. `sources`: source positions of robots by name."""
+        listed = tuple(defects)
+        kinds = {name: {d.kind for d in listed if d.property == name} for name in PROPERTIES}
+        holds = {name: None if k == {"undecided"} else not k for name, k in kinds.items()}
+        witness = tuple(_witness(net, defect, sources or {}) for defect in listed)
+        gears = net.gears
+        return cls(**holds, witness=witness, gears=gears, method=method, gear_train=gear_train)
 
 
 def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -> Witness:

@@ -17,16 +17,21 @@ from itertools import islice
 
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, Position, RunError
-from factory.theory.nets.composition import MOST, Composition, compose, named
+from factory.theory.nets.composition import MOST, Composition, named
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet, marked, token_free
 from factory.theory.nets.train import dead_train_defects, train_defects
-from factory.theory.nets.verdict import Defect, Verdict, listing, verdict
+from factory.theory.nets.verdict import Defect, Verdict, listing
 
 
 def proved(net: GearNet) -> Verdict:
-    """The verdict on a net all of whose properties hold. Raises RunError (NotProved) with a witness
-    for each that does not."""
+    """The verdict on a net all of whose properties hold.
+
+    Args:
+        net: a gear net.
+
+    Raises RunError (NotProved) with a witness for each that does not.
+    """
     proof = verify(net)
     if not proof.holds:
         raise RunError(
@@ -48,7 +53,7 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
     Live, safe and reversible are undecided (None) where the claim or the marking fails.
     """
     subject = marked(net)
-    against, train = shape_defects(net, subject, compose(subject))
+    against, train = shape_defects(net, subject, Composition.of(subject))
     illegal = legality_defects(net, subject)
     defects: Iterable[Defect] = ()
     if illegal or not train:
@@ -56,7 +61,7 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
         defects = (Defect(name, "undecided", text) for name in ("live", "safe", "reversible"))
     elif stuck := token_free(subject).stuck:
         defects = dead_train_defects(subject, stuck)
-    return verdict(subject, (*against, *defects, *illegal), train, sources)
+    return Verdict.of(subject, (*against, *defects, *illegal), train, sources)
 
 
 def shape_defects(

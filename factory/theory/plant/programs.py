@@ -47,26 +47,26 @@ class Program:
     name: str
     steps: tuple[ProgramStep, ...]
 
-
-def program_of(factory: Factory, robot: int) -> Program:
-    """The program of a robot (index), read off its gear."""
-    net = factory.net
-    gear = net.gears[robot]
-    tours = factory.tours
-    begun = [factory.operations[tour[0]].label for tour in tours[robot]]
-    onward = dict(zip((tour[-1] for tour in tours[robot]), begun[1:] + begun[:1], strict=True))
-    steps = []
-    for position, number in enumerate(factory.robots[robot].operations):
-        operation = factory.operations[number]
-        wait = net.threaded.places[gear.waiting(position)]
-        others = tuple(
-            (other, label)
-            for other, label in sorted(zip(operation.robots, operation.before, strict=True))
-            if other != robot
-        )
-        slot = operation.robots.index(robot)
-        pairs = zip(operation.robots, operation.before, strict=True)
-        turns = tuple(r for r, label in pairs if label == NOPART and len(tours[r]) > 1)
-        then = onward.get(number, "") if len(begun) > 1 else ""
-        steps.append(ProgramStep(wait.label, wait.mode, others, operation, slot, turns, then))
-    return Program(robot, factory.robots[robot].name, tuple(steps))
+    @classmethod
+    def of(cls, factory: Factory, robot: int) -> Program:
+        """The program of a robot (index), read off its gear."""
+        net = factory.net
+        gear = net.gears[robot]
+        tours = factory.tours
+        begun = [factory.operations[tour[0]].label for tour in tours[robot]]
+        onward = dict(zip((tour[-1] for tour in tours[robot]), begun[1:] + begun[:1], strict=True))
+        steps = []
+        for position, number in enumerate(factory.robots[robot].operations):
+            operation = factory.operations[number]
+            wait = net.threaded.places[gear.waiting(position)]
+            others = tuple(
+                (other, label)
+                for other, label in sorted(zip(operation.robots, operation.before, strict=True))
+                if other != robot
+            )
+            slot = operation.robots.index(robot)
+            pairs = zip(operation.robots, operation.before, strict=True)
+            turns = tuple(r for r, label in pairs if label == NOPART and len(tours[r]) > 1)
+            then = onward.get(number, "") if len(begun) > 1 else ""
+            steps.append(ProgramStep(wait.label, wait.mode, others, operation, slot, turns, then))
+        return cls(robot, factory.robots[robot].name, tuple(steps))

@@ -21,11 +21,18 @@ SHAPES = ("mesh", "box", "cylinder", "sphere")
 """Parameters that give a part a shape."""
 
 Value = float | str | tuple[float, ...]
+"""The value of a parameter: a number, a word or a vector."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A keyword argument of an operation, with the place of its value in the text."""
+    """A keyword argument of an operation.
+
+    Attributes:
+        name: its name.
+        value: its value.
+        position: the place of its value in the text.
+    """
 
     name: str
     value: Value
@@ -205,6 +212,10 @@ class PAG(Pictured):
         """The labels of the parts of each product."""
         each = (self.product(label).parts() for label in self.products)
         return tuple(frozenset(part.label for part in parts) for parts in each)
+
+    def most_allowed(self, one: str, other: str) -> float:
+        """The depth that two parts may overlap by [m], 0 where nothing is allowed of them."""
+        return most_allowed(self.allowed, one, other)
 
     def check_alone(self, option: str) -> None:
         """Raises InputError (BadMix) for a mix: an option is for one product."""

@@ -6,19 +6,14 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
-
-THIRD = -1
-"""The form of a join whose inputs a third robot takes; others are the number of the input that
-stays on its robot."""
+from typing import ClassVar
 
 MOST_RELAYS, MOST_ROBOTS = 99, 10**6
 """Upper bounds on numbers in a table that comes from elsewhere."""
 
 Turns = Sequence[Sequence[int]]
 """For each unit of a period, and each robot of the factory that has one robot for each tour, the
-robot (index) that does its tour. NOBODY does the tours of products that are not made in it."""
-
-NOBODY = -1
+robot (index) that does its tour; `Plan.NOBODY` where its product is not made in it."""
 
 NAME = re.compile(r"r[1-9][0-9]*")
 """A name of a robot."""
@@ -41,6 +36,9 @@ class Plan:
     the forms as they are written.
 
     Attributes:
+        THIRD: the form of a join whose inputs a third robot takes; others are the number of the
+            input that stays on its robot.
+        NOBODY: the robot that does a tour which is not made.
         forms: the form of each join, by label, that differs from the written one.
         relays: number of robots that hand over what a label names, on its way to the operation that
             takes it.
@@ -54,6 +52,9 @@ class Plan:
             bring different labels.
     """
 
+    THIRD: ClassVar[int] = -1
+    NOBODY: ClassVar[int] = -1
+
     forms: Mapping[str, int] = field(default_factory=dict)
     relays: Mapping[str, int] = field(default_factory=dict)
     turns: tuple[tuple[int, ...], ...] = ()
@@ -63,9 +64,9 @@ class Plan:
 
     def __post_init__(self) -> None:
         for name, values, least, most in (
-            ("forms", self.forms.values(), THIRD, 1),
+            ("forms", self.forms.values(), self.THIRD, 1),
             ("relays", self.relays.values(), 1, MOST_RELAYS),
-            ("turns", chain.from_iterable(self.turns), NOBODY, MOST_ROBOTS),
+            ("turns", chain.from_iterable(self.turns), self.NOBODY, MOST_ROBOTS),
             ("lifts", self.lifts or (), 0, MOST_ROBOTS),
             ("tees", chain.from_iterable(self.tees), 0, MOST_ROBOTS),
         ):
@@ -86,7 +87,7 @@ class Plan:
         `turns[t][r]` (index) what robot r does. Its lifts are to be found again."""
         first: Turns = self.turns or [range(len(turns[0]))]
         every = tuple(
-            tuple(turn[robot] if robot != NOBODY else NOBODY for robot in unit)
+            tuple(turn[robot] if robot != self.NOBODY else self.NOBODY for robot in unit)
             for turn in turns
             for unit in first
         )

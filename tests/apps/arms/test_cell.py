@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from factory.api import Diagnostic, InputError, Position, RunError, Settings
+from factory.api import Diagnostic, InputError, RunError, Settings
 from factory.apps.arms import few_arms
 from factory.apps.arms.arming import armed
 from factory.apps.arms.arrangement import Arrangement
@@ -24,8 +24,10 @@ from factory.engine.simulation.simulation import Simulation
 from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.layout.coordinating import with_machines
 from factory.floor.layout.request import Ground
-from factory.pipeline import Project, all_templates, read
+from factory.pipeline import Project, read
+from factory.support.errors import Position
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.verify import verify
 from tests.apps.arms.test_read import BOX, OWN, own
 from tests.arm_cells import SMALL, cell, refusal

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from factory.api import Array, Index, Project
+from factory.api import Project
 from factory.apps.arms import arrangement
 from factory.apps.arms.arming import armed, on_rails
 from factory.apps.arms.body import PAD_RADIUS, STEM, Stand, standing
@@ -25,8 +25,9 @@ from factory.apps.arms.legs import NoWay, transfer
 from factory.apps.arms.model import ArmModel
 from factory.apps.arms.scene import FAR, OWN, Scene, StandingBox
 from factory.apps.arms.sharing import STEPS, SweptArm
-from factory.pipeline import all_templates
+from factory.support.arrays import Array, Index
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from tests.arm_cells import chains, project, refusal
 from tests.arm_models import (
     ball,

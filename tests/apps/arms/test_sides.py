@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from factory.api import Array, Layout, RunError
+from factory.api import Layout, RunError
 from factory.apps.arms import laying
 from factory.apps.arms.arming import from_one_side
 from factory.apps.arms.cell import ToolGrip
@@ -22,8 +22,10 @@ from factory.apps.arms.orders import PrivateParts, private_parts
 from factory.apps.arms.rises import BEND, Rise
 from factory.apps.arms.scene import Scene
 from factory.floor.geometry.solids import Solid
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
+from factory.support.arrays import Array
 from factory.theory.lang import read_pag
+from factory.theory.lang.template_reader import all_templates
 from tests.arm_cells import SMALL, chains, project, refusal
 from tests.arm_models import PACE, random_way, shipped
 from tests.paths import EXAMPLES, ROOT

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.api import Array, RunRequest, Simulation, mujoco
+from factory.api import RunRequest, Simulation
 from factory.apps.arms import planning
 from factory.apps.arms.scene import StandingBox
 from factory.apps.runs.watched import watched
 from factory.engine.mjcf import names
+from factory.support.arrays import Array
+from factory.support.engine import mujoco
 from tests.arm_cells import chains, project, refusal
 
 TALL = """root = x;

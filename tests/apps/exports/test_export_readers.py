@@ -22,7 +22,7 @@ from factory.engine.mjcf.names import COMPASS
 from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
-from factory.floor.geometry.solids import rotation
+from factory.support.rotations import rotation
 from factory.theory.nets.marked import MarkedNet, marked
 from tests.export_values import (
     LAMP,

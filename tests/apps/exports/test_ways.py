@@ -18,10 +18,10 @@ from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import build_model
 from factory.engine.simulation.ordering import Ordering
 from factory.floor.layout.layout import Layout
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import read
 from factory.support.settings import Settings
 from factory.theory.nets.coordinated import Order
-from factory.theory.problem.robot_types import load_catalogue
 from tests.clearance_values import check
 from tests.random_products import random_product
 from tests.slow import slow_but

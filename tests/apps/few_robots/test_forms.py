@@ -34,6 +34,7 @@ from factory.floor.layout.durations import Pace
 from factory.floor.layout.saved import LayoutTable
 from factory.floor.layout.shapes import payload_boxes
 from factory.floor.mating.mating import judged
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import Project, read
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.resources import templates_folder
@@ -46,8 +47,7 @@ from factory.theory.nets.marked import marked
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
-from factory.theory.problem.plan import THIRD, Plan
-from factory.theory.problem.robot_types import load_catalogue
+from factory.theory.problem.plan import Plan
 from tests.command_line import Terminal
 from tests.layout_values import table_pag
 from tests.pag_values import TEMPLATES as OWN
@@ -71,9 +71,9 @@ def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
 def test_a_form_that_is_refused_is_not_chosen() -> None:
     pag = table_pag("s", ("s", "mate", "a b", {}), *((x, "atomic", "", {}) for x in "ab"))
     task = task_of(pag, {})
-    assert best_forms(task)[0]["s"] != THIRD
+    assert best_forms(task)[0]["s"] != Plan.THIRD
     refused = frozenset({("s", 0), ("s", 1)})
-    assert best_forms(replace(task, refused=refused))[0] == {"s": THIRD}
+    assert best_forms(replace(task, refused=refused))[0] == {"s": Plan.THIRD}
 
 
 def test_so_many_robots_come_before_hands_for_all_labels() -> None:
@@ -116,7 +116,7 @@ def random_plan(project: Project, rng: random.Random) -> Project:
         for label in joins(node)
     ]
     if rng.random() < 0.7:
-        forms = {label: rng.choice((THIRD, 0, 1)) for label in free if rng.random() < 0.5}
+        forms = {label: rng.choice((Plan.THIRD, 0, 1)) for label in free if rng.random() < 0.5}
         project = project.with_plan(Plan(forms))
     base = judged(project.compiled, project.product)
     if rng.random() < 0.7:

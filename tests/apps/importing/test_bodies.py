@@ -14,8 +14,8 @@ from factory.apps.importing import scene_file, threemf_file
 from factory.apps.importing.ldraw.shapes import mesh_of
 from factory.apps.importing.loose import bodies_in
 from factory.apps.importing.scene_file import COARSE, FINE, Y_UP, read_scene, read_step
-from factory.floor.geometry.glb_reader import GlbBody
-from factory.floor.geometry.mesh_file import UnreadableMesh
+from factory.support.meshes.glb_reader import GlbBody
+from factory.support.meshes.mesh_file import UnreadableMesh
 
 
 def scene(form: str) -> bytes:

@@ -12,12 +12,12 @@ import trimesh
 
 from factory.apps.importing.bodies import FileBody, solids_of
 from factory.apps.importing.zipping import zipped
-from factory.floor.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh
-from factory.floor.geometry.mesh_reader import read_mesh
-from factory.floor.geometry.meshes import is_closed, volume_of
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError
+from factory.support.meshes.mesh_file import EXPECTED, MeshFile, UnreadableMesh
+from factory.support.meshes.mesh_reader import read_mesh
+from factory.support.meshes.triangles import is_closed, volume_of
 from factory.theory.problem.pag import PAG
 from tests.layout_values import table_pag
 

@@ -23,12 +23,12 @@ from factory.apps.monitor.calm import spells
 from factory.apps.monitor.explanation import SeenFirings
 from factory.apps.monitor.record import recorded_subject, verdict_on, watch_log
 from factory.apps.monitor.recount import WORDS, _Places
+from factory.apps.runs.start import legal_marking
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
 from factory.support.errors import InputError
 from factory.support.settings import Settings
-from factory.theory.nets.history import legal_marking
 from factory.theory.nets.undone import Undone
 from tests.command_line import Terminal
 from tests.failing_runs import CAMPAIGN, failing

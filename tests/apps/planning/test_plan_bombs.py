@@ -19,10 +19,10 @@ import trimesh
 
 from factory.apps.importing.scene_file import read_scene
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.floor.geometry import glb_reader
-from factory.floor.geometry.mesh_file import UnreadableMesh
-from factory.pipeline import all_templates
 from factory.support.errors import FactoryError
+from factory.support.meshes import glb_reader
+from factory.support.meshes.mesh_file import UnreadableMesh
+from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "<f4").tobytes()
@@ -135,7 +135,7 @@ READ = """
 import sys
 from pathlib import Path
 from factory.apps.importing.scene_file import read_scene
-from factory.floor.geometry.mesh_file import UnreadableMesh
+from factory.support.meshes.mesh_file import UnreadableMesh
 for name in sys.argv[1:]:
     path = Path(name)
     try:

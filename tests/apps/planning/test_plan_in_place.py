@@ -13,8 +13,8 @@ import trimesh
 
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.pipeline import all_templates
 from factory.support.errors import InputError
+from factory.theory.lang.template_reader import all_templates
 from tests.command_line import Terminal
 
 TEMPLATES = all_templates(())

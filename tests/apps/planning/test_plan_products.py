@@ -7,7 +7,7 @@ import pytest
 
 from factory.apps.planning.plan import CannotAssemble, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
-from factory.pipeline import all_templates
+from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
 
 LDRAW = ROOT.parent / "shared" / "products" / "ldraw"

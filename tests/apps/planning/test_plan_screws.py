@@ -18,7 +18,7 @@ from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.writing import planned_product, screws_in
 from factory.engine.timing.timed import pace
-from factory.pipeline import all_templates
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.plan import Plan
 from tests.paths import ROOT
 from tests.plan_models import box, model_source, rod

@@ -16,7 +16,7 @@ from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.titles import Titles
 from factory.apps.planning.writing import Screwed, Tree, leaves
-from factory.pipeline import all_templates
+from factory.theory.lang.template_reader import all_templates
 
 Parts = Mapping[str, Manifold]
 

@@ -15,9 +15,10 @@ from factory.apps.planning import source
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.writing import planned_product
-from factory.pipeline import all_templates, read
+from factory.pipeline import read
 from factory.support.arrays import Array
 from factory.support.files import write_all
+from factory.theory.lang.template_reader import all_templates
 from tests.command_line import Terminal
 from tests.paths import ROOT
 

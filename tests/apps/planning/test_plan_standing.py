@@ -11,8 +11,8 @@ from manifold3d import Manifold
 from factory.apps.planning.plan import Planned, PlanOptions, plan
 from factory.apps.planning.source import SourceOptions, read_source
 from factory.apps.planning.standing import overhang
-from factory.pipeline import all_templates
 from factory.support.errors import InputError
+from factory.theory.lang.template_reader import all_templates
 from tests.paths import ROOT
 from tests.plan_models import box, jig, model_source, socket, tail
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from factory.apps.planning.source import read_source
-from factory.floor.geometry.meshes import volume_of
-from factory.pipeline import all_templates
+from factory.support.meshes.triangles import volume_of
+from factory.theory.lang.template_reader import all_templates
 from tests.command_line import Terminal
 from tests.paths import ROOT
 from tests.step_boxes import Box, Vector, step_of

@@ -24,7 +24,7 @@ from factory.floor.layout.crowding import Crowding
 from factory.floor.layout.durations import Pace
 from factory.floor.layout.embedding import certified
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.sweeps import piles, regions
+from factory.floor.layout.sweeps import regions
 from factory.floor.layout.way import FAR, Bend, Ways
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
@@ -43,7 +43,7 @@ def straight() -> Layout:
 
 
 def crowded(layout: Layout) -> Iterator[tuple[Region, Region]]:
-    return Crowding(layout).crowded(regions(layout, piles(layout.factory, layout.product)))
+    return Crowding(layout).crowded(regions(layout))
 
 
 def test_branches_that_come_too_near_are_seen(straight: Layout) -> None:

@@ -14,7 +14,7 @@ import pytest
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.driven import DrivenSupervisor, drive
 from factory.apps.plc.signals import NOBODY
-from factory.engine.simulation.compiled import compiled
+from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from tests.apps.plc.test_plc import text
@@ -371,7 +371,7 @@ def harmed_by(name: str, seeds: Iterable[int], most: float) -> dict[int, bool]:
     """The seeds of hostile controllers under which machines touch or drop something, and whether
     the plant stopped then."""
     layout, request = with_hands(name), RunRequest(units=5)
-    shared, program, harmed = compiled(layout, request), text(name), dict[int, bool]()
+    shared, program, harmed = Compiled.of(layout, request), text(name), dict[int, bool]()
     for seed in seeds:
         simulation = Simulation(layout, request, shared)
         under = Plc(program) if seed % 2 else None

@@ -18,7 +18,7 @@ from factory.apps.recovery.standing import MotionHold
 from factory.commands.summaries import say_failures
 from factory.engine.record.failures import Failures
 from factory.engine.record.state import State
-from factory.engine.simulation.compiled import compiled
+from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.request import RunRequest, WorldName
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
@@ -43,7 +43,7 @@ CAMPAIGN = Campaign()
 @cache
 def ready(name: str, asked: RunRequest) -> Any:
     """What runs share."""
-    return compiled(layout_of(name), asked)
+    return Compiled.of(layout_of(name), asked)
 
 
 def run_with(

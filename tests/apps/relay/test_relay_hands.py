@@ -15,6 +15,7 @@ from factory.floor.layout.dimensions import Clearance
 from factory.floor.layout.hands.in_the_way import BESIDE
 from factory.floor.layout.hands.limbs import cross_of
 from factory.floor.layout.layout import Layout
+from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import read
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
@@ -24,7 +25,6 @@ from factory.theory.lang.template_reader import load_templates
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.plan import Plan
 from factory.theory.problem.robot_bodies import ARM_WIDTH
-from factory.theory.problem.robot_types import load_catalogue
 from tests.layout_values import paper_layout, row_of_inserts
 
 SETTINGS = Settings()

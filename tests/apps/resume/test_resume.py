@@ -23,7 +23,7 @@ from factory.apps.log.reader import digest_of, header_in
 from factory.apps.log.writer import rows_of_a_block
 from factory.apps.resume.continued import last_full
 from factory.apps.resume.resuming import Resumed
-from factory.engine.simulation.compiled import Compiled, compiled
+from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.claim import claimed, claimed_again
@@ -72,7 +72,7 @@ def request_of(name: str) -> tuple[RunRequest, Compiled]:
     given: dict[str, Any] = {"world": "ideal"} if name == "lamp" else {"fuse": name == "truck"}
     alone = name == "fence"
     asked = RunRequest(units=20, seed=3, jitter=0.3, settings=FINE, distributed=alone, **given)
-    return asked, compiled(layout_of(name), asked)
+    return asked, Compiled.of(layout_of(name), asked)
 
 
 def made(name: str) -> Simulation:

@@ -19,10 +19,11 @@ from factory.apps.revise.revision import Revision, revised
 from factory.floor.layout.certificate import Fault
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.layout import Layout
-from factory.pipeline import Project, all_templates
+from factory.pipeline import Project
 from factory.support.errors import InputError
 from factory.theory.lang import read_pag, write_pag
 from factory.theory.lang.pag_reader import load_pag
+from factory.theory.lang.template_reader import all_templates
 from factory.theory.problem.pag import PAG, Mix, Parameter
 from factory.theory.problem.plan import Plan
 from tests.command_line import spawn

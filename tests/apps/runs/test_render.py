@@ -28,11 +28,11 @@ from factory.film.finale import LASTS
 from factory.film.picture import from_above
 from factory.film.reel import HOLD
 from factory.film.shot import Shot
-from factory.film.video import ENCODERS, VideoFile
 from factory.floor.geometry.meshes import Mesh
-from factory.floor.geometry.sight import Framing
 from factory.support import gl
 from factory.support.errors import InputError, MissingError
+from factory.support.pictures.sight import Framing
+from factory.support.pictures.video import ENCODERS, VideoFile
 from tests.opengl import needs_gl
 from tests.paths import ROOT
 
@@ -109,7 +109,7 @@ def test_a_killed_process_leaves_all_but_the_last_second(
     path = tmp_path / f"k{ending}"
     code = (
         "import sys, numpy as np; from pathlib import Path;"
-        "from factory.film.video import VideoFile;"
+        "from factory.support.pictures.video import VideoFile;"
         f"v = VideoFile(Path({str(path)!r}), (64, 48), {fps});"
         "noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8);"
         "[v.write(frame) for frame in noise];"

@@ -14,12 +14,13 @@ from factory.engine.mjcf.replica import Replica
 from factory.engine.record.failures import Failing
 from factory.engine.record.subject import MonitorSubject
 from factory.film.caption import TOLD, Caption, draw_notices
+from factory.film.colours import AMBER, DEAD
 from factory.film.gantt_panel import GanttPanel
 from factory.film.history import History
-from factory.film.ink import AMBER, DEAD, FLASH
 from factory.film.marks import Mark, Marks
 from factory.film.sheet import Rows
 from factory.film.shot import moment_of
+from factory.support.pictures.ink import FLASH
 from factory.support.settings import Settings
 from tests.failing_runs import failing, paper_layout
 

@@ -21,9 +21,9 @@ from factory.film.picture import Picture, orbit
 from factory.film.shot import moment_of, recorded_take
 from factory.film.spotlight import DIM, DIMMER, Spotlight
 from factory.film.tour import BETWEEN, OPENING, STAYS, Tour
-from factory.floor.geometry.sight import Framing, View
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
+from factory.support.pictures.sight import Framing, View
 from tests.examples import without_hands
 
 WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.api import Diagnostic, InputError, usage_error
+from factory.api import Diagnostic, InputError
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.defaults import with_defaults
@@ -18,6 +18,7 @@ from factory.commands.grouped import Grouped
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off, read_partly
 from factory.support.console import emit, say, table
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.api import Factory, Project, Timing
@@ -85,11 +86,10 @@ def analyze(
     out: OutputOptions,
 ) -> int:
     """Find the bottleneck of FILE.pag, and what would relieve it."""
-    from factory.api import Timing
+    from factory.api import Timing, proved
     from factory.apps.analyze import analyse
     from factory.apps.analyze.document import document
     from factory.apps.analyze.measured import Conditions, conditions, logged_record
-    from factory.theory.nets.verify import proved
 
     log = study.log(out.silent)
     made = (

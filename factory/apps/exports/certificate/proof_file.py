@@ -12,20 +12,12 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
-from factory.api import (
-    Diagnostic,
-    GearNet,
-    InputError,
-    MarkedNet,
-    Position,
-    RunError,
-    Verdict,
-    read_bytes,
-)
+from factory.api import Diagnostic, GearNet, InputError, MarkedNet, RunError, Verdict
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.listing import CLAIMS
 from factory.apps.exports.certificate.writer import certificate
-from factory.support.files import NET
+from factory.support.errors import Position
+from factory.support.files import NET, read_bytes
 
 Json = dict[str, Any]
 

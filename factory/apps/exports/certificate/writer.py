@@ -28,7 +28,7 @@ from typing import Any
 
 from factory.api import NONE, GearNet, MarkedNet, Verdict, marked, token_free
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
-from factory.theory.nets.composition import Composition, compose
+from factory.theory.nets.composition import Composition
 
 Json = dict[str, Any]
 
@@ -45,7 +45,7 @@ def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
         raise ValueError("two places have one name")
     if len(subject.net.transition_index) < len(subject.net.transitions):
         raise ValueError("two transitions have one name")
-    composition = compose(subject)
+    composition = Composition.of(subject)
     document: Json = {
         "schema": SCHEMA,
         "net": _listing(net, subject),

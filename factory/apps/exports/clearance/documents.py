@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from factory.api import Diagnostic, InputError, MarkedNet, marked, mujoco, read_bytes, read_text
+from factory.api import Diagnostic, InputError, MarkedNet, marked, read_text
 from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.apps.log.content import LARGE
-from factory.support.engine import unwarned
-from factory.support.files import NET
+from factory.support.engine import mujoco, unwarned
+from factory.support.files import NET, read_bytes
 
 ENDINGS = ("xml", "coordinated.pnml", "ways.json", "clearance.json")
 """The ends of the names of the four files; the first is that of the model."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from functools import cached_property
 
-from factory.api import mujoco
+from factory.support.engine import mujoco
 
 FREE = int(mujoco.mjtJoint.mjJNT_FREE)
 LEVEL = 1e-6

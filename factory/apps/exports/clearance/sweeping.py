@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import MultiPoint
 
-from factory.api import mujoco
 from factory.apps.exports.clearance.documents import MachineWay
 from factory.apps.exports.clearance.machines import Machines
+from factory.support.engine import mujoco
 
 Boxes = NDArray[np.float64]
 Points = NDArray[np.float64]

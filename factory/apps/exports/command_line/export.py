@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from factory.api import usage_error
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUT, OUTPUT, PATH, RELAY, SOURCE
@@ -18,6 +17,7 @@ from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced, cut_off
 from factory.support.console import emit, say, warn
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.apps.exports.subject import Source
@@ -92,10 +92,11 @@ def export(
 
     FILE is a PAG, a net in PNML, or a LOG of `run --log`.
     """
-    from factory.api import Project, write_all
+    from factory.api import Project
     from factory.apps.exports.writing import check_taken, exporter, read_source, takes_folder
     from factory.apps.exports.writing import export as exported
     from factory.apps.log import Log
+    from factory.support.files import write_all
 
     chosen = exporter(form, of, exporting)
     piped, output = output == STDOUT, None if output == STDOUT else output

@@ -9,11 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from factory.api import Diagnostic, Factory, InputError, Layout, Settings
+from factory.api import Diagnostic, Factory, InputError, Layout, Settings, coordinated
 from factory.apps.exports.iec import declarations as iec
 from factory.apps.exports.iec.robots import COMPLETED, RobotBlocks
 from factory.apps.exports.subject import Subject
-from factory.floor.layout.exclusions import coordinated
 from factory.floor.modes.modes import operation_modes
 from factory.floor.modes.staging import stages_of
 

@@ -18,7 +18,7 @@ from factory.apps.exports.iec.declarations import OrganizationUnit, Variable, co
 from factory.floor.modes.staging import HeadStart
 from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Order
-from factory.theory.plant.programs import Program, ProgramStep, program_of
+from factory.theory.plant.programs import Program, ProgramStep
 
 WAIT, RUN, GRIP, LEAVE = range(4)
 """Phases of a step: it waits for the others; moves to the goal; opens or closes the grip and waits
@@ -58,7 +58,7 @@ class RobotBlocks:
 
     def block(self, robot: int) -> OrganizationUnit:
         """The function block of a robot (index)."""
-        program = program_of(self.layout.factory, robot)
+        program = Program.of(self.layout.factory, robot)
         body = ["CASE State OF"]
         for number, step in enumerate(program.steps):
             body += self._step(program, number, step)

@@ -58,11 +58,11 @@ def fidelity(
     max_time: float | None,
 ) -> int:
     """Compare MuJoCo with the ideal world over the same seeds."""
+    from factory.api import proved
     from factory.apps.fidelity import measure
     from factory.apps.sweep.pool import cores
     from factory.support.files import write_text
     from factory.support.progress import StepBar
-    from factory.theory.nets.verify import proved
 
     writable(output)
     project = options.project(out.silent)

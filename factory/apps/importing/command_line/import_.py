@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from factory.api import Diagnostic, InputError, usage_error
+from factory.api import Diagnostic, InputError
 from factory.commands.options import LIBRARY, OUT, OUTPUT, PATH, TEMPLATES
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
+from factory.support.errors import usage_error
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
@@ -66,11 +67,10 @@ def import_(
     SOURCE is an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of materials with
     levels (.csv), or a folder with one of these.
     """
-    from factory.api import write_all
+    from factory.api import all_templates
     from factory.apps.importing import Options, import_product
     from factory.apps.importing.draft import Mates
-    from factory.pipeline import all_templates
-    from factory.support.files import own_names
+    from factory.support.files import own_names, write_all
 
     for folder, option in ((library, "--library"), (meshes, "--meshes")):
         _require_folder(folder, option)
@@ -130,9 +130,8 @@ def _chosen(columns: Sequence[str]) -> dict[str, str]:
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """The warnings that `build` will give about the shapes of a written PAG."""
-    from factory.api import load_pag
+    from factory.api import load_pag, product_geometry
     from factory.floor.geometry.overlapping import overlaps_of
-    from factory.floor.geometry.product import product_geometry
 
     try:
         made = load_pag(pag, templates)

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from factory.api import Position
 from factory.apps.importing.draft import ImportFaults
-from factory.theory.lang.source import Source, quoted
-from factory.theory.lang.words import number
+from factory.support.decimals import number
+from factory.support.errors import Position
+from factory.support.texts import Source, quoted
 
 FURTHEST = 1e7
 """The largest number of a line [LDU]: 4 km."""

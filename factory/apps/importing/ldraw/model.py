@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Diagnostic
+from factory.api import Diagnostic, Parameter
 from factory.apps.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.apps.importing.ldraw.lines import (
     INHERITED,
@@ -31,8 +31,8 @@ from factory.apps.importing.ldraw.shapes import (
 )
 from factory.apps.importing.mesh_files import MeshStore
 from factory.apps.importing.part_maker import Placement
-from factory.theory.lang.source import quoted
-from factory.theory.problem.pag import Parameter
+from factory.support.arrays import Array
+from factory.support.texts import quoted
 
 DENSITY = 1050.0
 """Density of ABS [kg/m³]."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Array, Diagnostic, read_text
+from factory.api import Diagnostic, read_text
 from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.ldraw.lines import (
     LDrawFile,
@@ -18,7 +18,8 @@ from factory.apps.importing.ldraw.lines import (
     read_lines,
 )
 from factory.apps.importing.mesh_files import first_file, obj_of, path_inside
-from factory.theory.lang.source import quoted, source_of
+from factory.support.arrays import Array
+from factory.support.texts import quoted, source_of
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
 """The folders of a library, in the order of the search."""

@@ -50,13 +50,12 @@ def view(
 
     There you can pause it, push robots and block feeders. With --spares or --faults the run
     recovers from failures: you can pause or kill robots."""
-    from factory.api import Simulation
+    from factory.api import Simulation, proved
     from factory.apps.live import Server, Session
     from factory.apps.live.page import page
     from factory.apps.live.server import check_server
     from factory.apps.runs.running import campaign_of, check_run
     from factory.support.interruption import Interruption
-    from factory.theory.nets.verify import proved
 
     check_server(host, expose)
     project = options.project(out.silent)

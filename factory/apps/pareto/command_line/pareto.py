@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.api import Diagnostic, usage_error
+from factory.api import Diagnostic
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, ON, OUT, OUTPUT, SECONDS, SOURCE
@@ -18,7 +18,7 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
-from factory.support.errors import StoppedError
+from factory.support.errors import StoppedError, usage_error
 
 if TYPE_CHECKING:
     from factory.api import Project
@@ -143,10 +143,9 @@ def _written(
 ) -> tuple[Sequence[str | None], list[Path]]:
     """Write the page and the files of the points into a folder, if there is one. Returns the
     commands that build the points, and the files."""
-    from factory.api import write_all
     from factory.apps.pareto.front import commands_of, point_files
     from factory.apps.pareto.page import floor_plans, front_page
-    from factory.support.files import own_names
+    from factory.support.files import own_names, write_all
 
     if folder is None:
         return [None] * len(front.points), []

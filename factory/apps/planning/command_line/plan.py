@@ -23,11 +23,12 @@ from factory.support.errors import MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
-    from factory.api import Array, Project
+    from factory.api import Project
     from factory.apps.planning.parts import InPlace
     from factory.apps.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.apps.planning.searching import Aim
     from factory.floor.geometry.overlapping import Overlapping
+    from factory.support.arrays import Array
     from factory.theory.plant.approaches import Approach, Kind
 
 LOOKS = ("exploded.png", "assembly.mp4")
@@ -111,12 +112,13 @@ def plan(
     named bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose assembly tree is
     to be ignored; all parts are where they are in the finished product.
     """
+    from factory.api import all_templates
     from factory.apps.few_robots.sharing import with_lines
     from factory.apps.importing.draft import file_stem
     from factory.apps.planning.outcome import write_planned
     from factory.apps.planning.plan import CannotAssemble, PlanOptions
     from factory.apps.planning.source import SourceOptions, read_source
-    from factory.pipeline import all_templates, read
+    from factory.pipeline import read
     from factory.support.files import own_names
     from factory.theory.lang.overlaps import overlaps_in
 

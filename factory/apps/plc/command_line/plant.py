@@ -6,7 +6,6 @@ import sys
 
 import click
 
-from factory.api import usage_error
 from factory.apps.runs.options import RunOptions
 from factory.commands.defaults import with_defaults
 from factory.commands.grouped import Grouped
@@ -15,6 +14,7 @@ from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.summaries import summarise, tell_failures
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
+from factory.support.errors import usage_error
 
 SCAN = 10
 """Default period at which the plant reads its commands [ms]."""
@@ -56,10 +56,9 @@ def plant(
     It ends when its products are made. The controller writes targets, grips, jobs and a heartbeat,
     without which all axes stand. What the net or the reach of a grip does not allow is refused by
     name. `export --format st` writes a controller."""
-    from factory.api import Simulation
+    from factory.api import Simulation, proved
     from factory.apps.plc.opcua import OpcuaPlant, check_plant
     from factory.apps.runs.running import carry_on
-    from factory.theory.nets.verify import proved
 
     check_plant(host, expose)
     if asked.start is not None:

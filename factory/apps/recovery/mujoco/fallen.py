@@ -10,9 +10,8 @@ import numpy as np
 
 from factory.api import MujocoWorld
 from factory.apps.recovery.sweeping import SweptFloor
-from factory.engine.mjcf.driving import GRAVITY
 from factory.engine.mjcf.masks import robot_code
-from factory.floor.layout.bins import TOP, Bin
+from factory.floor.layout.bins import Bin
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -40,7 +39,7 @@ class Jets:
         middle = masses @ d.xipos[chosen] / masses.sum()
         way = np.array(target.middle) - middle[:2]
         way += BEYOND * way / max(float(np.linalg.norm(way)), BEYOND)
-        speed = way / sqrt(2 * max(middle[2] - TOP / 2, TOP / 2) / GRAVITY)
+        speed = way / sqrt(2 * max(middle[2] - Bin.TOP / 2, Bin.TOP / 2) / -m.opt.gravity[2])
         tick = self._world.model.settings.tick
         seconds = ceil(BLOWN / tick - 1e-9) * tick
         d.xfrc_applied[chosen, :2] = masses[:, None] * speed / seconds
@@ -133,7 +132,7 @@ class Fallen:
         radius, d, into = self._world.model.carried.radius, self._world.d, heap.into
         extents = ((*d.xipos[body].tolist(), radius[label]) for label, body in heap.bodies.items())
         return into is not None and all(
-            into.holds((x, y)) and z < TOP + far for x, y, z, far in extents
+            into.holds((x, y)) and z < Bin.TOP + far for x, y, z, far in extents
         )
 
     def _near(self) -> frozenset[int]:

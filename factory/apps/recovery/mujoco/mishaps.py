@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import MujocoWorld, Operation, mujoco
+from factory.api import MujocoWorld, Operation
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.simulation.mujoco.pressing import PRESSED
+from factory.support.engine import mujoco
 
 FAR = 1.0
 """Contact of what lies askew is counted to this depth, and presses on nothing [m]."""

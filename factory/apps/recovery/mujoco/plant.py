@@ -7,7 +7,7 @@ from math import radians
 
 import numpy as np
 
-from factory.api import NOPART, Array, Factory, Index, MujocoWorld, Operation
+from factory.api import NOPART, Factory, MujocoWorld, Operation, RunVerdict
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
@@ -15,9 +15,9 @@ from factory.apps.recovery.mujoco.mishaps import Mishaps
 from factory.apps.recovery.plant import Plant
 from factory.engine.mjcf.masks import robot_code
 from factory.engine.mjcf.weld_frames import WeldFrames
-from factory.engine.record.verdict import MOST
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.floor.layout.bins import Bin
+from factory.support.arrays import Array, Index
 
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""
@@ -27,10 +27,10 @@ SHARE = 0.5
 """A feeder's camera finds what is off by this share of what a hand-off may be (`verdict.LIMITS`):
 the rest is left to its noise and to the robot that takes the part."""
 
-SHIFTED = SHARE * MOST["handoff_gap_max_mm"] / 1e3
+SHIFTED = SHARE * RunVerdict.MOST["handoff_gap_max_mm"] / 1e3
 """Largest displacement that no camera finds [m]; a template may ask for less."""
 
-TURNED = SHARE * radians(MOST["handoff_angle_max_deg"])
+TURNED = SHARE * radians(RunVerdict.MOST["handoff_angle_max_deg"])
 """Largest angle that no camera finds [rad]."""
 
 LOST = 5e-3

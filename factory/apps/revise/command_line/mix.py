@@ -33,9 +33,9 @@ def mix(
 
     What ONE.pag and OTHER.pag have in common is written once.
     """
-    from factory.api import load_pag, write_all, write_pag
+    from factory.api import all_templates, load_pag, write_pag
     from factory.apps.revise.family import family
-    from factory.pipeline import all_templates
+    from factory.support.files import write_all
 
     writable(output)
     templates, counts = all_templates(folders), _counts(count)

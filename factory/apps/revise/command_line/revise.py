@@ -56,12 +56,11 @@ def revise(
 
     With --live, -o DIR also writes DIR/family.pag, the mix of both, and DIR/live.csv, orders for a
     change: factory run DIR/family.pag --demand DIR/live.csv --units 18 --wip 4"""
-    from factory.api import pace, write_all
+    from factory.api import pace, proved
     from factory.apps.exports.build import BuildRequest, build
     from factory.apps.revise.live import FAMILY_NAME, ORDERS_NAME, LiveChange
     from factory.apps.revise.revision import revised
-    from factory.support.files import own_names
-    from factory.theory.nets.verify import proved
+    from factory.support.files import own_names, write_all
 
     writable(picture)
     writable_folder(output)

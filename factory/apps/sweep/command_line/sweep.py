@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.api import usage_error
 from factory.commands import options as shared
 from factory.commands.grouped import Grouped
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
+from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
     from factory.apps.sweep.summary import Summary

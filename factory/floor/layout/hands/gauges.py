@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.floor.layout.guidepath import Point2
 from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.tips import tip
 from factory.support.arrays import Array
+from factory.support.boxes import Point2
 
 
 def middle(hand: Hand) -> Array:

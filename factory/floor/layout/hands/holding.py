@@ -9,12 +9,12 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.floor.geometry.solids import Product
-from factory.floor.geometry.turning import axis_of, fed_of
+from factory.floor.geometry.turning import fed_of
+from factory.floor.layout.branches import carriers
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
-from factory.floor.layout.layout import carriers
 from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
@@ -110,7 +110,7 @@ class Holding:
         """The axis of a part that is presented turned: hands hold it there, so that it turns about
         their pads."""
         if fed_of(self.product, parts):
-            x, y, _ = axis_of(self.product.solids[parts[0]]).tolist()
+            x, y, _ = self.product.solids[parts[0]].axis.tolist()
             yield x, y, 0.0
 
     def _about_axis(self, parts: Sequence[str], places: Places) -> Places:

@@ -3,9 +3,9 @@ part, and what is clear of a hand that has released its payload."""
 
 from __future__ import annotations
 
-from factory.floor.layout.dimensions import up
 from factory.floor.layout.feeding import passing
 from factory.floor.layout.layout import Layout
+from factory.support.decimals import up
 from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import end_of
 

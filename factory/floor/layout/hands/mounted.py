@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from factory.floor.layout.dimensions import BEAM, FINGER, FINGER_LOW, FINGER_TOP
-from factory.floor.layout.guidepath import Extent, Point2
 from factory.floor.layout.hands.clamp import PALM
 from factory.floor.layout.hands.hand import PAD, ROOT, Hand, Point3
 from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, NONE, HandKind
 from factory.floor.layout.hands.reach import AIR
+from factory.support.boxes import Extent, Point2
 from factory.theory.problem.robot_bodies import ARM_LOW, ARM_TOP, CARRIAGE_TOP, MAST
 
 Round = Literal["", "x", "z"]

@@ -13,8 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.floor.geometry.merging import merged_vertices
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.merging import merged_vertices
+
+__all__ = ["PartShape", "RigidMotion", "motion_between", "shape_of"]
 
 CLOSE, DIGITS = 2e-5, 1e-6
 """The tolerance for equal vertices: the first share of the shape's size, or the second share of its

@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.film.ink import Pixels
+from factory.support.pictures.ink import Pixels
+
+__all__ = ["smooth"]
 
 SHARE, LEAST = 12, 6
 """Steps in brightness are smoothed that are more than the brighter side over this, and so large at
@@ -50,9 +52,9 @@ def smooth(pixels: Pixels) -> Pixels:
     spread = np.abs(mean - here) / np.maximum(_range(here, north, south, west, east), 1.0)
     spread = np.clip(spread, 0.0, 1.0)
     share = np.maximum(share, SINGLE * (spread * spread * (3 - 2 * spread)) ** 2)[:, None]
-    mixed = flat.copy()
-    mixed[at] = (1 - share) * flat[at] + share * flat[at + across] + np.float32(0.5)
-    return np.asarray(mixed.reshape(pixels.shape), np.uint8)
+    blended = flat.copy()
+    blended[at] = (1 - share) * flat[at] + share * flat[at + across] + np.float32(0.5)
+    return np.asarray(blended.reshape(pixels.shape), np.uint8)
 
 
 def _bright(pixels: Pixels) -> NDArray[np.uint8]:

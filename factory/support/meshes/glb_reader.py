@@ -15,9 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry.mesh_file import EXPECTED, UnreadableMesh
-from factory.floor.geometry.solids import rotation
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.mesh_file import EXPECTED, UnreadableMesh
+from factory.support.meshes.triangles import moved_by
+from factory.support.rotations import rotation
+
+__all__ = ["MOST", "UPRIGHT", "Colour", "GlbBody", "read_glb"]
 
 MOST = 10_000_000
 """The most numbers of an accessor, and the most triangles of all placed bodies."""
@@ -45,6 +48,7 @@ UPRIGHT = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 Colour = tuple[float, ...] | None
+"""Red, green, blue and opacity, from 0 to 1; None where a file states none."""
 Triangles = tuple[Array, Indices]
 """Vertices (n, 3) and faces (m, 3)."""
 
@@ -74,12 +78,6 @@ def read_glb(content: bytes, upright: Matrix = UPRIGHT) -> list[GlbBody]:
             placed = tuple(moved_by(upright @ matrix, *body) for body in shape.bodies)
             bodies.append(GlbBody((_name(node), shape.names[1]), placed, shape.colours))
     return bodies
-
-
-def moved_by(matrix: Matrix, vertices: Array, faces: Indices) -> Triangles:
-    """Triangles after an affine map (4, 4), still oriented outwards if it mirrors them."""
-    flips = bool(np.linalg.det(matrix[:3, :3]) < 0)
-    return vertices @ matrix[:3, :3].T + matrix[:3, 3], faces[:, ::-1] if flips else faces
 
 
 def gamma_encoded(light: float) -> float:

@@ -6,6 +6,8 @@ import numpy as np
 
 from factory.support.arrays import Array, Indices
 
+__all__: list[str] = []
+
 STEPS = 1e8
 """Vertices are in one place if they are so on a grid of so many steps a unit."""
 

@@ -22,12 +22,17 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from factory.film.ink import Pixels
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.files import partial_of, unwritten
 from factory.support.interruption import put_off
+from factory.support.pictures.ink import Pixels
 from factory.support.resource import Closing
+
+__all__ = ["Size", "VideoFile", "check_output"]
+
+Size = tuple[int, int]
+"""Width and height [px]."""
 
 FPS = 30.0
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
+from factory.floor.robots.schema import JOINTS, RobotDocument, numbers
 from factory.support.xml_tree import Element
 from factory.theory.problem.robot_bodies import MOTIONS, TURN_JOINT, Jaw
-from factory.theory.problem.robot_schema import JOINTS, RobotDocument, numbers
 
 LONGEST = 0.05
 """Greatest stroke of a jaw [m]."""

@@ -14,9 +14,23 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from factory.engine.mjcf.robot_bodies import role_of
-from factory.film.look import ROLES, Colour3
-from factory.theory.plant.factory import Factory
+__all__ = [
+    "GROUND",
+    "INK",
+    "Colour",
+    "Ink",
+    "Pixels",
+    "fitted",
+    "width",
+]
+
+Pixels = NDArray[np.uint8]
+"""A picture (height, width, 3)."""
+
+Colour = tuple[int, int, int]
+"""Red, green and blue, from 0 to 255."""
+
+Coverage = NDArray[np.float32]
 
 GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205, 209, 215)
 """The ground, a shade lighter than the floor in the pictures; words, lesser words, lines."""
@@ -24,62 +38,12 @@ GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205,
 EDGE, FLASH = (222, 224, 229), (232, 60, 48)
 """Between the picture and the panels; what fires, and the present."""
 
-AMBER = (214, 148, 22)
-"""Robots that stand."""
-
-DEAD = (40, 40, 44)
-"""Robots that are dead, until they are replaced."""
-
 WHITE = (255, 255, 255)
-
-TEMPLATES = {
-    "atomic": (120, 144, 172),
-    "mate": (66, 133, 190),
-    "insert": (124, 108, 178),
-    "weld": (222, 128, 48),
-    "dropoff": (44, 138, 118),
-}
-"""Operations that come with factory."""
-
-OTHERS = ((190, 84, 130), (150, 132, 38), (98, 128, 66), (168, 92, 70), (70, 150, 160))
-"""Operations of the user's own, in the order in which the factory needs them."""
-
-
-def template_colours(factory: Factory) -> dict[str, Colour]:
-    """The colour of each template of a factory, in the order in which products come by."""
-    names = dict.fromkeys(o.template.name for o in reversed(factory.making))
-    users = [name for name in names if name not in TEMPLATES]
-    chosen = {**TEMPLATES, **{name: OTHERS[n % len(OTHERS)] for n, name in enumerate(users)}}
-    return {name: chosen[name] for name in (*names, factory.dropoff.template.name)}
-
-
-def operation_colours(factory: Factory) -> tuple[Colour, ...]:
-    """The colour of each operation: that of its template."""
-    chosen = template_colours(factory)
-    return tuple(chosen[o.template.name] for o in factory.operations)
-
-
-def robot_colours(factory: Factory) -> tuple[Colour, ...]:
-    """The colour of each robot: the paint of its role."""
-    paint = {role: _colour(shade) for role, shade in ROLES.items()}
-    return tuple(paint[role_of(factory, robot.index)] for robot in factory.robots)
-
-
-def _colour(shade: Colour3) -> Colour:
-    red, green, blue = (round(255 * part) for part in shade)
-    return red, green, blue
 
 
 def pale(colour: Colour, share: float = 0.78) -> Colour:
     """A colour thinned with white."""
-    return mixed(colour, WHITE, share)
-
-
-Pixels = NDArray[np.uint8]
-
-Colour = tuple[int, int, int]
-
-Coverage = NDArray[np.float32]
+    return blended(colour, WHITE, share)
 
 
 class Ink:
@@ -180,7 +144,7 @@ ENDING = re.compile(r"(?<=\w\w\w)([/_.-]\w{1,5}|\d{1,3})$")
 
 def fitted(text: str, points: int, room: float) -> str:
     """A text, shortened to fit; "" if less than three letters or two fifths of it fit. What tells
-    a label from its like is kept: the number of `box/3` and `log12`, the end of `axle_left`."""
+    a label from its like is kept: the number of `box/3` and `peg12`, the end of `axle_left`."""
     if width(text, points) <= room:
         return text
     match = ENDING.search(text)
@@ -192,8 +156,8 @@ def fitted(text: str, points: int, room: float) -> str:
     return ""
 
 
-def mixed(one: Colour, other: Colour, share: float) -> Colour:
-    """A mixture of two colours."""
+def blended(one: Colour, other: Colour, share: float) -> Colour:
+    """A colour between two."""
     red, green, blue = (round(a + share * (b - a)) for a, b in zip(one, other, strict=True))
     return red, green, blue
 
@@ -225,7 +189,7 @@ def _font(points: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 @lru_cache(4096)
 def _mask(text: str, points: int) -> Coverage:
-    """Coverage of a line of text, with a spare column on the right."""
+    """Coverage of a line of text, with one more column on the right."""
     font = _font(FINE * points)
     reach = ImageDraw.Draw(Image.new("L", (1, 1))).textlength(text, font)
     size = int(np.ceil(reach / FINE)) + 1, round(1.5 * points)

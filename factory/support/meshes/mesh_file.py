@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.floor.geometry.merging import merged_vertices
-from factory.floor.geometry.meshes import normals_of
-from factory.floor.geometry.pieces import joined
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.merging import merged_vertices
+from factory.support.meshes.triangles import areas_of, joined
+
+__all__ = ["ANEW", "EXPECTED", "MeshFile", "UnreadableMesh", "checked"]
 
 EXPECTED = {
     ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",
@@ -45,11 +46,6 @@ class MeshFile:
     def areas(self) -> Array:
         """The area of each body."""
         return np.array([areas_of(*body).sum() for body in self.bodies])
-
-
-def areas_of(vertices: Array, faces: Indices) -> Array:
-    """The area of each triangle (m,)."""
-    return np.asarray(np.linalg.norm(normals_of(vertices, faces), axis=1) / 2)
 
 
 def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:

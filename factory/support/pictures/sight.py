@@ -12,6 +12,8 @@ import numpy as np
 
 from factory.support.arrays import Array
 
+__all__ = ["Framing", "View", "fit", "towards"]
+
 FIELD = 24.0
 """The angle of view across the shorter side of a picture [degrees]: narrow, for little
 perspective."""

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.floor.geometry.mesh_file import areas_of
-from factory.floor.geometry.meshes import is_closed
-from factory.floor.geometry.pieces import components
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.triangles import areas_of, components, is_closed
+
+__all__ = ["SLIVERS"]
 
 if TYPE_CHECKING:
     import trimesh

@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.floor.geometry.glb_reader import MOST, read_glb
-from factory.floor.geometry.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
 from factory.support.arrays import Array, Indices
+from factory.support.meshes.glb_reader import MOST, read_glb
+from factory.support.meshes.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
+
+__all__ = ["read_mesh"]
 
 if TYPE_CHECKING:
     import trimesh

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from factory.support.arrays import Array, Indices
 
+__all__ = ["bodies", "connected"]
+
 Mask = NDArray[np.bool_]
 
 SAME = 1e-4

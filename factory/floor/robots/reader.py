@@ -11,6 +11,19 @@ from collections.abc import Mapping
 from math import ceil, inf
 from pathlib import Path
 
+from factory.floor.robots.jaws import JawReader
+from factory.floor.robots.schema import (
+    FITTED,
+    HAND,
+    JOINTS,
+    KINDS,
+    LIMBS,
+    MATERIALS,
+    MOVING,
+    SIZES,
+    RobotDocument,
+    numbers,
+)
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.files import TABLE, read_bytes
 from factory.support.xml_tree import Element
@@ -25,19 +38,6 @@ from factory.theory.problem.robot_bodies import (
     SLIDE,
     RobotAxis,
     RobotBody,
-)
-from factory.theory.problem.robot_jaws import JawReader
-from factory.theory.problem.robot_schema import (
-    FITTED,
-    HAND,
-    JOINTS,
-    KINDS,
-    LIMBS,
-    MATERIALS,
-    MOVING,
-    SIZES,
-    RobotDocument,
-    numbers,
 )
 
 WIDEST = 1.0
