@@ -136,6 +136,7 @@ class MujocoWorld:
 
     def observe(self, at_end: bool = False) -> Observation:
         """The state of the engine, whose arrays change with its next step."""
+        self.motion.show()
         return self._view.look(at_end)
 
     @property
