@@ -133,15 +133,16 @@ class Stroking:
             at = np.clip(np.rint(since).astype(np.intp), 0, setpoints.shape[2] - 1)
             self._drives.show(moving, setpoints[self._down[moving], moving, at])
 
-    def settle(self) -> None:
+    def settle(self) -> bool:
         """Let those stand that have completed their strokes since. The engine lets them sleep by
-        itself: until then they are never slow."""
+        itself: until then they are never slow. Returns whether there are any."""
         (over,) = (self.ends <= self._drives.time + self._drives.timestep / 2).nonzero()
         if len(over):
             down = self._down[over] == 1
             self._stand(over[down], True)
             self._stand(over[~down], False)
             self.ends[over] = NEVER
+        return bool(len(over))
 
 
 def _padded(setpoints: Array, samples: int) -> Array:
