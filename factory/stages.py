@@ -9,7 +9,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import inf
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, TypeAlias
@@ -112,15 +111,16 @@ def compile(
     """The factory (R, ~, N) that makes a product (paper, section 5).
 
     With at most so many `robots`, or with few for a `cycle` time [s], it is searched for: by laying
-    out at most so many factories (`effort`), none after so many `seconds`. `parallel`: for each of
+    out at most so many factories (`effort`), within so many `seconds`. `parallel`: for each of
     some labels how often the branch that brings it is there. Raises InputError.
     """
-    from factory.apps.few_robots.aim import Aim
+    from factory.apps.few_robots.aim import Aim, usual_seconds
     from factory.apps.few_robots.search import allocated
     from factory.apps.few_robots.sharing import with_branches
 
     project, branches = project_of(product, settings, templates), tuple((parallel or {}).items())
-    aim = Aim(robots, cycle, effort, inf if seconds is None else seconds, branches)
+    usual = usual_seconds(len(project.pag), effort)
+    aim = Aim(robots, cycle, effort, usual if seconds is None else seconds, branches)
     if branches and not aim.asks:
         return with_branches(project, branches).plain
     return allocated(project, aim).plain

@@ -235,7 +235,8 @@ RELAY = options(
         "--seconds",
         "limit",
         type=SECONDS,
-        help="Time limit of the search for few robots [s]; a message says if it was reached.",
+        help="Time limit of the search for few robots [s]; a message says if it was reached"
+        " (default: 100 for more than 1,000 labels, unless --effort is given; else none).",
     ),
 )
 WIP = click.option(

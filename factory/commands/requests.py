@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import count
-from math import inf, prod
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -191,15 +191,17 @@ class ProjectOptions:
 
     def _with_few_robots(self, project: Project, silent: bool) -> Project:
         """The project with the plan that is found for --robots and --cycle."""
-        from factory.apps.few_robots.aim import Aim, usual_effort
+        from factory.apps.few_robots.aim import Aim, usual_effort, usual_seconds
         from factory.apps.few_robots.search import allocated
         from factory.support.console import warn
         from factory.support.progress import StepBar
 
         several = self.branches()
         units = prod(k for _, k in several)
-        effort = self.effort or usual_effort(len(project.pag) * units)
-        aim = Aim(self.robots, self.cycle, effort, self.limit or inf, several)
+        labels = len(project.pag) * units
+        effort = self.effort or usual_effort(labels)
+        seconds = self.limit or usual_seconds(labels, self.effort)
+        aim = Aim(self.robots, self.cycle, effort, seconds, several)
         looked_at, warnings = count(), list[Diagnostic]()
         with StepBar("searching for few robots", silent) as steps:
 

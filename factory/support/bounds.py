@@ -4,6 +4,8 @@ budget of a search: a number of candidates, the same on any machine, and an uppe
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from math import inf
 from numbers import Integral, Real
@@ -13,6 +15,13 @@ from typing import Any, Literal, get_args
 
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 from factory.support.settings import LONGEST
+
+_end: ContextVar[float] = ContextVar("end", default=inf)
+"""When the time of the search is over in which work is done."""
+
+
+class TimeOver(Exception):
+    """The time of a search is over, and with it the work on a candidate."""
 
 
 @dataclass(slots=True)
@@ -56,6 +65,24 @@ class Allowance:
         """The share of the time that is used up; infinite once the search is stopped."""
         elapsed = self.elapsed
         return elapsed if elapsed == inf else elapsed / self.seconds
+
+    @staticmethod
+    def heed() -> None:
+        """Called again and again by long work: raises TimeOver where the time of the search in
+        which it is done is over."""
+        if monotonic() > _end.get():
+            raise TimeOver
+
+    @contextmanager
+    def limits(self) -> Iterator[None]:
+        """Within its context work that heeds the time ends with it, and so does the context."""
+        token = _end.set(self.begun + self.seconds)
+        try:
+            yield
+        except TimeOver:
+            self.cut_off = True
+        finally:
+            _end.reset(token)
 
     def spend(self) -> None:
         """Count one more candidate."""

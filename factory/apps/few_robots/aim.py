@@ -98,11 +98,22 @@ def usual_effort(labels: int) -> int:
     return min(max(LABELS // labels, EFFORTS[0]), EFFORTS[1])
 
 
+LARGE, USUAL = 1000, 100.0
+"""Number of labels from which a search ends after so long [s], if neither effort nor time is given:
+one layout of such a product may take minutes."""
+
+
+def usual_seconds(labels: int, effort: int | None) -> float:
+    """Default of the time after which a search ends [s], for a product with so many labels and an
+    effort, None where none is given."""
+    return USUAL if labels > LARGE and effort is None else inf
+
+
 @dataclass(frozen=True, slots=True)
 class Aim:
     """Number of `robots`, LEAST for as few as found, None for any number; the `cycle` time to be
     reached [s], None for the shortest. `effort`: greatest number of factories that are laid out,
-    None for the default; none is begun after `seconds`. `branches`: labels, with the number of
+    None for the default; the search ends after `seconds`. `branches`: labels, with the number of
     copies of the branch that brings each. Raises InputError (Usage) for a wrong value."""
 
     robots: int | Literal["least"] | None = None

@@ -12,7 +12,7 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Catalogue, Factory, Pace, Plan, Product, marked
+from factory.api import Allowance, Catalogue, Factory, Pace, Plan, Product, marked
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
 from factory.floor.layout.guidepath import Box
@@ -86,6 +86,7 @@ class Shift:
         that gives the lines of no limit at all."""
         unlimited, settled = dict[Filling, tuple[Line, ...]](), set[Filling]()
         for filling in self.fillings(step, slacks):
+            Allowance.heed()
             without = replace(filling, limit=inf)
             if without in settled:
                 continue

@@ -20,6 +20,7 @@ from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.presence import ACROSS, ALONG, ANY, ROUNDING, Presence
 from factory.floor.mating.depth import rough, spanned
 from factory.support.arrays import Array, Index, Indices, Truth
+from factory.support.bounds import Allowance
 
 BLOCK = 1 << 14
 """Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of
@@ -68,6 +69,7 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
         block = np.cumsum(count[pairs].sum(axis=1)) // BLOCK
         for some in np.split(pairs, np.flatnonzero(np.diff(block)) + 1):
             which, numbers = np.unique(some, return_inverse=True)
+            Allowance.heed()
             boxes = _Boxes([presences[n] for n in which.tolist()], hulls[which])
             yield from boxes.nearest(numbers.reshape(-1, 2), clearance)
 

@@ -74,7 +74,7 @@ class ContactMasks:
         self.solid = {
             body: self._solid_geoms(with_shells) for body, with_shells in self._own.items()
         }
-        self._with_geoms = {body: own[m.body_geomnum[own] > 0] for body, own in self._own.items()}
+        self._with_geoms = {body: ids[m.body_geomnum[ids] > 0] for body, ids in self._own.items()}
         self._partners: dict[str, list[tuple[str, Inside]]] = {}
         for one, other in apart:
             self._partners.setdefault(one[0], []).append((one[1], other))
