@@ -91,6 +91,7 @@ class _Boxes:
     def __init__(self, presences: Sequence[Presence], hulls: Array) -> None:
         self._presences, self._hulls = presences, hulls
         self._boxes = np.concatenate([p.boxes for p in presences])
+        self._ends = np.ascontiguousarray(self._boxes.transpose(2, 1, 0))
         self._layers = np.concatenate([p.layers for p in presences])
         self._count = np.array([len(presence.boxes) for presence in presences], int)
         self._first = np.cumsum(self._count) - self._count
@@ -102,7 +103,8 @@ class _Boxes:
         (first, second), most = pairs.T, needed.max(axis=1)
         here = self._within(first, self._hulls[second], most)
         there = self._within(second, self._hulls[first], most)
-        for pair, one, other in _combined(here, there, len(pairs)):
+        for some in _combined(here, there, len(pairs)):
+            pair, one, other = self._close(*some, most)
             lacking = _overlap(self._boxes[one], self._boxes[other])
             lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
             meets = lacking > ROUNDING
@@ -114,6 +116,17 @@ class _Boxes:
                 mine, others = both[pair[n]]
                 i, j = one[n] - self._first[first[pair[n]]], other[n] - self._first[second[pair[n]]]
                 yield Near(mine, others, (mine.name(i), others.name(j)), float(lacking[n]))
+
+    def _close(
+        self, pair: Index, one: Index, other: Index, apart: Array
+    ) -> tuple[Index, Index, Index]:
+        """Those of the boxes of pairs (m,) that come nearer than the distance of their pair (n,)
+        along each axis: few are left after the first."""
+        for low, high in self._ends:
+            depth = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
+            meets = depth + apart[pair] > ROUNDING
+            pair, one, other = pair[meets], one[meets], other[meets]
+        return pair, one, other
 
     def _within(self, which: Index, hulls: Array, apart: Array) -> tuple[Index, Index]:
         """The boxes of presences (n,) that come nearer than distances (n,) to other hulls (n, 2,
