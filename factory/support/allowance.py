@@ -3,12 +3,22 @@ time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from math import inf
 from time import monotonic
 
 __all__ = ["Allowance"]
+
+
+_end: ContextVar[float] = ContextVar("end", default=inf)
+"""When the time of the search is over in which work is done."""
+
+
+class TimeOver(Exception):
+    """The time of a search is over, and with it the work on a candidate."""
 
 
 @dataclass(slots=True)
@@ -52,6 +62,24 @@ class Allowance:
         """The share of the time that is used up; infinite once the search is stopped."""
         elapsed = self.elapsed
         return elapsed if elapsed == inf else elapsed / self.seconds
+
+    @staticmethod
+    def heed() -> None:
+        """Called again and again by long work: raises TimeOver where the time of the search in
+        which it is done is over."""
+        if monotonic() > _end.get():
+            raise TimeOver
+
+    @contextmanager
+    def limits(self) -> Iterator[None]:
+        """Within its context work that heeds the time ends with it, and so does the context."""
+        token = _end.set(self.begun + self.seconds)
+        try:
+            yield
+        except TimeOver:
+            self.cut_off = True
+        finally:
+            _end.reset(token)
 
     def spend(self) -> None:
         """Count one more candidate."""

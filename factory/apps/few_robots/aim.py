@@ -100,7 +100,7 @@ def usual_effort(labels: int) -> int:
 class Aim:
     """Number of `robots`, "least" for as few as found, None for any number; the `cycle` time to be
     reached [s], None for the shortest. `effort`: greatest number of factories that are laid out,
-    None for the default; none is begun after `seconds`. `branches`: labels, with the number of
+    None for the default; the search ends after `seconds`. `branches`: labels, with the number of
     copies of the branch that brings each. Raises InputError (Usage) for a wrong value."""
 
     robots: int | Literal["least"] | None = None

@@ -16,6 +16,7 @@ from factory.api import Catalogue, Factory, Finder, Node, Pace, Plan, Product, m
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
 from factory.floor.mating.findings import Level
+from factory.support.allowance import Allowance
 from factory.support.boxes import Box
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
 
@@ -81,6 +82,7 @@ class Shift:
         that gives the lines of no limit at all."""
         unlimited, settled = dict[Filling, tuple[Line, ...]](), set[Filling]()
         for filling in self.fillings(step, slacks):
+            Allowance.heed()
             without = replace(filling, limit=inf)
             if without in settled:
                 continue

@@ -18,7 +18,7 @@ from factory.api import Diagnostic, InputError, Plan, Project
 from factory.apps.few_robots.aim import Aim, least_robots, usual_effort
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
-from factory.apps.few_robots.estimating import Estimator
+from factory.apps.few_robots.estimating import Estimate, Estimator
 from factory.apps.few_robots.folding import kept_apart, lines_of
 from factory.support.allowance import Allowance
 
@@ -28,6 +28,9 @@ CHANGES = 60
 SINGLE, SHARED = 0.3, 0.8
 """Shares of the effort after which factories with one robot for each label are no longer tried, and
 after which estimates are no longer laid out."""
+
+ESTIMATING = 0.5
+"""The share of the time after which no further forms are estimated, so that some are laid out."""
 
 Seen = Callable[[Candidate, Candidate], None]
 """Told of each candidate, and of the best so far."""
@@ -61,9 +64,9 @@ def allocated(
         hint = "give it more --seconds, or less --effort"
         warn(Diagnostic("OutOfTime", message, None, hint))
     if isinstance(aim.robots, int) and best.robots > aim.robots:
-        message = f"no factory with {aim.robots} robots was found"
+        message = f"no factory with {aim.robots} robots was found{search.estimated()}"
         hint = f"a longer search with more {'--seconds' if search.cut_off else '--effort'}"
-        if best.has_layout:
+        if not search.cut_off and best.has_layout:
             message += f", only with {best.robots}"
             hint = f"--robots {best.robots}, or {hint}"
         raise InputError(Diagnostic("TooFewRobots", message + search.why(), None, hint))
@@ -84,12 +87,13 @@ class Search:
     def __init__(self, project: Project, aim: Aim, estimator: Estimator | None = None) -> None:
         self.aim, effort = aim, aim.effort or usual_effort(len(project.pag))
         self.budget = Allowance(effort, aim.seconds)
-        self.forms = Allowance(effort, aim.seconds)
+        self.forms = Allowance(effort, ESTIMATING * aim.seconds)
         bare = replace(project.ground, relay=False, cycle=None, tile=None)
         if project.ground.tile is not None:  # the floor is that of the bends, which are found last
             bare = replace(bare, floor=None)
         self.estimator = estimator or Estimator(project.with_ground(bare), aim.branches)
         self.written = self.best = self.estimator.written
+        self.promising: Estimate | None = None
 
     @property
     def cut_off(self) -> bool:
@@ -106,8 +110,12 @@ class Search:
         return max(0, blocked), *self.aim.rank(one.robots, seconds, max(0, bare))
 
     def look(self, seen: Seen = lambda *_: None) -> None:
-        """For forms and lines, as long as there is effort left and something better may be found.
-        Each candidate is `seen`."""
+        """For forms and lines, as long as there is effort and time left and something better may be
+        found. Each candidate is `seen`."""
+        with self.budget.limits():
+            self._look(seen)
+
+    def _look(self, seen: Seen) -> None:
         seen(self.written, self.best)
         for candidates in (self.singles(), self._shared()):
             for candidate in candidates:
@@ -115,6 +123,13 @@ class Search:
                 seen(candidate, self.best)
         while self._better(self._changed(), seen):
             pass
+
+    def estimated(self) -> str:
+        """In words, which factory promised most before it was laid out; "" for none."""
+        one = self.promising
+        if one is None:
+            return ""
+        return f"; by estimate {one.robots} robots take {one.seconds:.2f} s, not laid out"
 
     def why(self) -> str:
         """What keeps two lines of the best apart, in words; "" where nothing is known to."""
@@ -139,6 +154,7 @@ class Search:
             self.forms.spent = 0
             front = front or bare.front(self.forms, fewer)
         front.sort(key=lambda one: aim.rank(one.robots, one.seconds, one.bare))
+        self.promising = front[0] if front else None
         for one in front:
             if self.budget.over(SHARED):
                 return

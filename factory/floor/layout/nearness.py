@@ -19,6 +19,7 @@ from factory.floor.layout.crossings import near as near_boxes
 from factory.floor.layout.dimensions import PAYLOADS
 from factory.floor.layout.presence import ACROSS, ALONG, ANY, ROUNDING, Presence
 from factory.floor.mating.depth import rough, spanned
+from factory.support.allowance import Allowance
 from factory.support.arrays import Array, Index, Indices, Truth
 
 BLOCK = 1 << 14
@@ -68,6 +69,7 @@ def near(presences: Sequence[Presence], clearance: float) -> Iterator[Near]:
         block = np.cumsum(count[pairs].sum(axis=1)) // BLOCK
         for some in np.split(pairs, np.flatnonzero(np.diff(block)) + 1):
             which, numbers = np.unique(some, return_inverse=True)
+            Allowance.heed()
             boxes = _Boxes([presences[n] for n in which.tolist()], hulls[which])
             yield from boxes.nearest(numbers.reshape(-1, 2), clearance)
 
@@ -89,6 +91,7 @@ class _Boxes:
     def __init__(self, presences: Sequence[Presence], hulls: Array) -> None:
         self._presences, self._hulls = presences, hulls
         self._boxes = np.concatenate([p.boxes for p in presences])
+        self._ends = np.ascontiguousarray(self._boxes.transpose(2, 1, 0))
         self._layers = np.concatenate([p.layers for p in presences])
         self._count = np.array([len(presence.boxes) for presence in presences], int)
         self._first = np.cumsum(self._count) - self._count
@@ -100,7 +103,8 @@ class _Boxes:
         (first, second), most = pairs.T, needed.max(axis=1)
         here = self._within(first, self._hulls[second], most)
         there = self._within(second, self._hulls[first], most)
-        for pair, one, other in _combined(here, there, len(pairs)):
+        for some in _combined(here, there, len(pairs)):
+            pair, one, other = self._close(*some, most)
             lacking = _overlap(self._boxes[one], self._boxes[other])
             lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
             meets = lacking > ROUNDING
@@ -112,6 +116,17 @@ class _Boxes:
                 mine, others = both[pair[n]]
                 i, j = one[n] - self._first[first[pair[n]]], other[n] - self._first[second[pair[n]]]
                 yield Near(mine, others, (mine.name(i), others.name(j)), float(lacking[n]))
+
+    def _close(
+        self, pair: Index, one: Index, other: Index, apart: Array
+    ) -> tuple[Index, Index, Index]:
+        """Those of the boxes of pairs (m,) that come nearer than the distance of their pair (n,)
+        along each axis: few are left after the first."""
+        for low, high in self._ends:
+            depth = np.minimum(high[one], high[other]) - np.maximum(low[one], low[other])
+            meets = depth + apart[pair] > ROUNDING
+            pair, one, other = pair[meets], one[meets], other[meets]
+        return pair, one, other
 
     def _within(self, which: Index, hulls: Array, apart: Array) -> tuple[Index, Index]:
         """The boxes of presences (n,) that come nearer than distances (n,) to other hulls (n, 2,

@@ -45,15 +45,6 @@ class SpeedProfile:
         cruise = max(distance - (2 * peak * peak - start * start) / (2 * a), 0.0)
         return (2 * peak - start) / a + cruise / peak
 
-    def least(self, distance: Array, start: Array) -> Array:
-        """The least times (n,) [s] to come `distance` (n,) [m] ahead, at rest or not, from the
-        speeds `start` (n,) [m/s], no greater than the limit."""
-        v, a = self.speed, self.acceleration
-        start = np.minimum(start, v)
-        gaining = (v * v - start * start) / (2 * a)
-        soon = (np.sqrt(start * start + 2 * a * np.minimum(distance, gaining)) - start) / a
-        return soon + np.maximum(distance - gaining, 0.0) / v
-
     def landing(self, distance: float) -> float:
         """The least time [s] to come to rest `distance` [m] ahead, from whatever speed: that of a
         robot in the ideal world, which has no ramp at the start."""

@@ -74,6 +74,7 @@ class ContactMasks:
         self.solid = {
             body: self._solid_geoms(with_shells) for body, with_shells in self._own.items()
         }
+        self._with_geoms = {body: ids[m.body_geomnum[ids] > 0] for body, ids in self._own.items()}
         self._partners: dict[str, list[tuple[str, Inside]]] = {}
         for one, other in apart:
             self._partners.setdefault(one[0], []).append((one[1], other))
@@ -116,24 +117,28 @@ class ContactMasks:
         """Put parts into the hands of holders, by code."""
         for body, holder in holders.items():
             self.code[self._own[body]] = holder
-            self._cover(body, holder, SOFT)
+        self._cover(holders, SOFT)
 
     def let_go(self, bodies: Iterable[int]) -> None:
         """Let parts that nothing holds any more collide with each other, too. They still count as
         those of their last holder."""
-        for body in bodies:
-            self._cover(body, loose_code(body), STIFF * self._arrays.m.opt.timestep)
+        loose = {body: loose_code(body) for body in bodies}
+        self._cover(loose, STIFF * self._arrays.m.opt.timestep)
 
-    def _cover(self, body: int, code: int, softness: float) -> None:
-        """Give a part's body, with its shells, the masks of a code, and contacts of a time constant
-        [s]."""
-        masks, bodies = np.array(masks_of(code)), self._own[body]
-        self.fresh.add(int(self.code[body]))
-        with_geoms = bodies[self._arrays.m.body_geomnum[bodies] > 0]
-        self._masks[:, with_geoms] = masks[:, None]
-        self._mask("body", with_geoms, masks)
-        self._mask("geom", self.solid[body], masks)
-        self._arrays["geom_solref"][self.solid[body], 0] = softness
+    def _cover(self, codes: Mapping[int, int], softness: float) -> None:
+        """Give the bodies of parts, with their shells, the masks of codes, and contacts of a time
+        constant [s]."""
+        if not codes:
+            return
+        self.fresh.update(self.code[[*codes]].tolist())
+        masks = np.array([masks_of(code) for code in codes.values()]).T
+        for kind, of in (("body", self._with_geoms), ("geom", self.solid)):
+            each = [of[body] for body in codes]
+            at, wanted = np.concatenate(each), np.repeat(masks, [*map(len, each)], axis=1)
+            self._mask(kind, at, wanted)
+            if kind == "body":
+                self._masks[:, at] = wanted
+        self._arrays["geom_solref"][at, 0] = softness
 
     def _mask(self, kind: str, at: Index, masks: NDArray[Any]) -> None:
         """Write the contypes and conaffinities (2,) or (2, n) of bodies or geoms."""

@@ -8,8 +8,9 @@ gate waits for the robot.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -89,12 +90,38 @@ def along(bundle: Bundle, tick: float, timestep: float) -> Callable[[Array, Arra
     return go
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Points that axes come past.
+
+    Attributes:
+        axes: which axes (n,).
+        at: where, on the way of each (n,) [m].
+        direction: +1 where an axis comes to larger positions, -1 to smaller ones (n,).
+    """
+
+    axes: Index
+    at: Array
+    direction: Array
+
+    @classmethod
+    def of(cls, passes: Collection[Past]) -> Points:
+        """Those of some passes."""
+        axes, at, direction = zip(*((p.axis, p.at, p.direction) for p in passes), strict=True)
+        return cls(np.array(axes, np.intp), np.array(at), np.array(direction))
+
+    def chosen(self, numbers: Index) -> Points:
+        """Some of them."""
+        return Points(self.axes[numbers], self.at[numbers], self.direction[numbers])
+
+
 class Follower:
     """The axes that follow a course; `x` [m] and `v` [m/s] (axes,): the references of all axes."""
 
     def __init__(self, x: Array, v: Array, drives: Drives, substeps: int) -> None:
         self.x, self.v, self._drives, self._substeps = x, v, drives, substeps
         self.axes: Index = np.empty(0, np.intp)
+        self._slot = np.full(len(x), -1)
         self.course: Course | None = None
         self._at = 0
 
@@ -113,19 +140,21 @@ class Follower:
         """Whether the course is over, near a goal."""
         return self.course is not None and self.over and self.course.near
 
-    def until(self, past: Past) -> int:
-        """Remaining ticks until a reference may have passed a point; all of them if it never
-        does."""
-        if self.course is None or past.axis not in self.axes:
-            return self.left
-        slot = int(np.flatnonzero(self.axes == past.axis)[0])
-        left = (past.at - self.course.x[self._at :, slot]) * past.direction
-        there = left <= AHEAD
-        return int(there.argmax()) if there.any() else self.left
+    def until(self, points: Points) -> float:
+        """Remaining ticks until an axis may have come past its point; inf if none does in the
+        course."""
+        if self.course is None:
+            return inf
+        slots = self._slot[points.axes]
+        left = (points.at - self.course.x[self._at :, slots]) * points.direction
+        there = ((left <= AHEAD) & (slots >= 0)).any(axis=1)
+        return float(there.argmax()) if there.any() else inf
 
     def begin(self, axes: Index, course: Course) -> None:
         """Start a course of axes."""
         self.axes, self.course, self._at = axes, course, 0
+        self._slot[:] = -1
+        self._slot[axes] = np.arange(len(axes))
         self._drives.follow(axes, course.setpoints)
 
     def show(self, ticks: int) -> None:

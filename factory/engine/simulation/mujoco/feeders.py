@@ -16,6 +16,7 @@ import numpy as np
 from factory.engine.mjcf.masks import feeder_codes
 from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.parts import presented_at
+from factory.engine.simulation.mujoco.courses import Points
 from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.engine.simulation.mujoco.passing import Passing
 from factory.engine.simulation.mujoco.sliders import Sliders
@@ -55,7 +56,9 @@ class Feeders:
         back: withdrawn parts.
         lacking: labels of parts that robots wait for.
         due: the time by which such a part must come to be in time [s].
-        clear_from: no robot for which an empty slider waits is out of its way before this [s].
+        blocked: the points past which the robots are out of the way of empty sliders that wait for
+            them; None for no such slider.
+        clear_from: none of them is there before this [s].
     """
 
     def __init__(
@@ -75,6 +78,7 @@ class Feeders:
         self.back = TakenBack()
         self.lacking = set[str]()
         self.due = self.clear_from = NEVER
+        self.blocked: Points | None = None
         self._spent = dict[int, int]()
         self._number = {station.label: n for n, station in enumerate(self._stations)}
         operations, rising = model.factory.operations, coordinated(model.layout).rising
@@ -161,9 +165,9 @@ class Feeders:
         taken = [self._number[o.label] for o in operations if o.label in self._number]
         self._send(np.array(taken, np.intp), down=False)
 
-    def tend(self, moving: Index) -> bool:
+    def tend(self) -> bool:
         """Let the next parts come down from housings whose sliders are up and whose robots are out
-        of the way. `moving`: the axes under way. Returns whether an awaited part comes."""
+        of the way. Returns whether an awaited part comes."""
         self._sliders.settle()
         if self.back.numbers:
             self._take_back()
@@ -171,10 +175,8 @@ class Feeders:
         idle = [n for n in self._vacant() if self._stations[n].code not in busy]
         is_clear = self._passing.clear() if idle else ()
         free = [number for number in idle if is_clear[number]]
-        waiting = [number for number in idle if not is_clear[number]]
+        self.blocked = self._passing.points([number for number in idle if not is_clear[number]])
         self.clear_from = NEVER
-        if waiting:
-            self.clear_from = self._sliders.now + self._passing.until_clear(waiting, moving)
         if free:
             late = self._obstructed()
             free = [number for number in free if number not in late]
@@ -186,6 +188,10 @@ class Feeders:
         come = self.lacking & {self._stations[number].label for number in loaded.tolist()}
         self.lacking -= come
         return bool(come)
+
+    def until_clear(self) -> float:
+        """No robot comes out of the way before so long [s], whatever pushes it."""
+        return NEVER if self.blocked is None else self._passing.until_past(self.blocked)
 
     def at_rest(self) -> Iterator[tuple[Station, int, int]]:
         """Presented parts on resting sliders that no camera has examined: station, unit, body."""

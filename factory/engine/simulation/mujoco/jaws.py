@@ -96,7 +96,7 @@ class Jaws:
         for robot in [r for r in self._closed if r not in self._closing and not held(r)]:
             self._moves.send(self._closed.pop(robot), down=False)
 
-    def show(self, steps: int) -> None:
-        """Write the setpoints of what moves after some timesteps."""
+    def show(self) -> None:
+        """Write the present setpoints of what moves."""
         if self._moves is not None:
-            self._moves.show(steps)
+            self._moves.show()

@@ -173,10 +173,14 @@ class Motion:
         self.outfeed.loading = False
         if bundle is not None:
             self.robots.show(ticks)
-        self.sliders.show(ticks * self.settings.steps)
-        self.jaws.show(ticks * self.settings.steps)
         self.stepping.advance(ticks * self.settings.steps)
         return ticks
+
+    def show(self) -> None:
+        """Write into `ctrl` where sliders and jaws are on their strokes, for who looks at it: the
+        drives have these setpoints since the strokes began."""
+        self.sliders.show()
+        self.jaws.show()
 
     def move_tray(self, ticks: int) -> int:
         """Move the tray along its way for some ticks, at most to the end of a course. Returns how
@@ -265,8 +269,6 @@ class Motion:
         where they are now."""
         if self.outfeed.follower.left:
             self.outfeed.follower.show(1)
-        self.sliders.show(0)
-        self.jaws.show(0)
         axes = np.flatnonzero(self.plan[2:].any(axis=0))
         if len(axes):
             begun, *_, a = self.plan[:, axes]

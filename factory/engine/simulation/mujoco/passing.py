@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
 
 import numpy as np
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.model import Model
 from factory.engine.simulation.mujoco.axes import Axes
+from factory.engine.simulation.mujoco.courses import Points
 from factory.engine.simulation.request import RunRequest
 from factory.floor.layout.coordinating import HOME
 from factory.floor.layout.feeding import Outlet, outlets_of, passing
@@ -72,6 +72,8 @@ class Passing:
         hands = [layout.hand(robot) for robot in carriers]
         self._hang = [hand is not None and hand.kind.hangs for hand in hands]
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
+        at = np.where(self._first, self._home, self._clear)
+        self._points = Points(self._carriers, at, np.where(self._first, 1, -1))
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
@@ -116,20 +118,18 @@ class Passing:
         self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
-    def until_clear(self, numbers: Sequence[int], moving: Index) -> float:
-        """No robot of some outlets that is in the way is out of it before so long [s], if these
-        axes alone are `moving`. One whose hand must be there first delivers its part before that:
-        the end of an operation tells."""
-        (x, v), first, carriers = self._at(), self._first[numbers], self._carriers[numbers]
-        moves = np.zeros(len(self._axes), bool)
-        moves[moving] = True
-        goes = moves[carriers] & ~(first & self.holds[numbers])
-        if not goes.any():
-            return inf
-        ways = np.where(first, self._home[numbers] - HOME - x[numbers], (x - self._clear)[numbers])
-        speeds = np.where(first, v[numbers], -v[numbers])
-        least = self._fastest.least(np.maximum(ways[goes], 0.0), np.maximum(speeds[goes], 0.0))
-        return float(least.min())
+    def points(self, numbers: Sequence[int]) -> Points | None:
+        """The points past which the robots of some outlets are out of the way; None for no such
+        robot. One whose hand must be there first delivers its part before that: the end of an
+        operation tells."""
+        ways = [n for n in numbers if not (self._first[n] and self.holds[n])]
+        return self._points.chosen(np.array(ways)) if ways else None
+
+    def until_past(self, points: Points) -> float:
+        """No robot comes past its point before so long [s], wherever it is and whatever pushes
+        it."""
+        ways = (points.at - self._axes.measured(self._d)[0][points.axes]) * points.direction
+        return float(ways.min()) / self._fastest.speed
 
     def soonest(self, number: int) -> float:
         """Least time in which a robot can be at its feeder [s]; 0 for a hand from above: the part

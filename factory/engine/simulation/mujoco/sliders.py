@@ -83,10 +83,12 @@ class Sliders(Stroking):
         super().send(chosen, down, loaded)
         self.up = self._first_up()
 
-    def settle(self) -> None:
-        """Let sliders stand that have completed their strokes since."""
-        super().settle()
-        self.up = self._first_up()
+    def settle(self) -> bool:
+        """Let sliders stand that have completed their strokes since. Returns whether any has."""
+        over = super().settle()
+        if over:
+            self.up = self._first_up()
+        return over
 
     def _first_up(self) -> float:
         return float(self.ends[self._down == 0].min(initial=NEVER))

@@ -122,28 +122,27 @@ class Stroking:
         self._drives.follow(chosen, self._strokes.setpoints[int(down), chosen])
         self._down[chosen], self._begun[chosen] = down, self._drives.time
         self.ends[chosen] = self._drives.time + self._strokes.seconds[int(down), chosen]
-        self.show(0)
         self._sleep.wake(self._body[chosen])
 
-    def show(self, steps: int) -> None:
-        """Write the setpoints of what moves after some timesteps."""
+    def show(self) -> None:
+        """Write the present setpoints of what moves."""
         (moving,) = (self.ends < NEVER).nonzero()
         if len(moving):
             since = (self._drives.time - self._begun[moving]) / self._drives.timestep
             setpoints = self._strokes.setpoints
-            at = np.rint(since).astype(np.intp) + steps
-            at = np.clip(at, 0, setpoints.shape[2] - 1)
+            at = np.clip(np.rint(since).astype(np.intp), 0, setpoints.shape[2] - 1)
             self._drives.show(moving, setpoints[self._down[moving], moving, at])
 
-    def settle(self) -> None:
+    def settle(self) -> bool:
         """Let those stand that have completed their strokes since. The engine lets them sleep by
-        itself: until then they are never slow."""
+        itself: until then they are never slow. Returns whether there are any."""
         (over,) = (self.ends <= self._drives.time + self._drives.timestep / 2).nonzero()
         if len(over):
             down = self._down[over] == 1
             self._stand(over[down], True)
             self._stand(over[~down], False)
             self.ends[over] = NEVER
+        return bool(len(over))
 
 
 def _padded(setpoints: Array, samples: int) -> Array:

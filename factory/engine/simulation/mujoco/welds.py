@@ -101,10 +101,10 @@ class PadGaps:
 
     def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
         m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
-        frame = self._frames.chosen(np.array([weld]))
-        slides = d.qpos[frame.along]
-        d.geom_xpos[pads] = self._at_zero[pads] + slides[0] @ frame.way[0]
-        if frame.deep[0]:
+        slides = d.qpos[self._frames.along[weld]][None]
+        d.geom_xpos[pads] = self._at_zero[pads] + slides[0] @ self._frames.way[weld]
+        if self._frames.deep[weld]:
+            frame = self._frames.chosen(np.array([weld]))
             turn = rotations(frame.turned(slides))[0] @ rotations(frame.turn)[0].T
             off = self._at_zero[pads] - frame.base[0]
             d.geom_xpos[pads] = frame.at(slides)[0] + off @ turn.T

@@ -17,6 +17,7 @@ from factory.engine.mjcf.loading import compiled, fingerprint, load
 from factory.engine.mjcf.model import Model
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import EngineView, Observation
+from factory.engine.simulation.mujoco.courses import Points
 from factory.engine.simulation.mujoco.fast.neighbours import Neighbours
 from factory.engine.simulation.mujoco.fast.strides import Strides
 from factory.engine.simulation.mujoco.inspection import Inspection
@@ -31,6 +32,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
 from factory.support.arrays import Array, Index
 from factory.support.engine import by_name, mujoco
+from factory.support.settings import MOST
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
 from factory.theory.plant.demand import Word
@@ -134,6 +136,7 @@ class MujocoWorld:
 
     def observe(self, at_end: bool = False) -> Observation:
         """The state of the engine, whose arrays change with its next step."""
+        self.motion.show()
         return self._view.look(at_end)
 
     @property
@@ -208,15 +211,20 @@ class MujocoWorld:
             ticks = min(ticks, self.model.settings.stride - self._unseen)
         else:
             motion.plan_robots(bundle)
-        if until:
-            ticks = 1 if self.d.ncon else min(ticks, max(1, min(map(motion.robots.until, until))))
-        feeders = self.parts.feeders
-        due = min(feeders.due, feeders.clear_from, motion.sliders.up)
-        left = (due - self.time) / self.model.settings.tick
-        if left < ticks:
-            ticks = max(1, ceil(left - ROUNDED))
-        self._settle(motion.step(bundle, ticks))
+        self._settle(motion.step(bundle, min(ticks, self._until_due(until))))
         return motion.robots.near
+
+    def _until_due(self, until: Collection[Past]) -> int:
+        """Ticks until an awaited pass may have come, or something is to be done at a feeder."""
+        robots, feeders, tick = self.motion.robots, self.parts.feeders, self.model.settings.tick
+        if feeders.blocked:
+            clear = robots.until(feeders.blocked) * tick
+            feeders.clear_from = self.time + (feeders.until_clear() if self.d.ncon else clear)
+        due = min(feeders.due, feeders.clear_from, self.motion.sliders.up)
+        left = (due - self.time) / tick - ROUNDED
+        if until:
+            left = min(left, 0.0 if self.d.ncon else robots.until(Points.of(until)))
+        return max(1, ceil(min(left, MOST)))
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """Let `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
@@ -254,7 +262,7 @@ class MujocoWorld:
         if feeders.due <= self.motion.sliders.now:
             feeders.due, self.supplied = NEVER, True
         if min(self.motion.sliders.up, feeders.clear_from) <= self.motion.sliders.now:
-            self.supplied |= feeders.tend(self.motion.active)
+            self.supplied |= feeders.tend()
         if outfeed.busy and outfeed.rests():
             self.supplied = True
             if unit is None:
@@ -281,7 +289,7 @@ class MujocoWorld:
         self._unseen = 0
         self.inspection.welds()
         self.motion.jaws.tend(self._in_hand)
-        self.supplied |= self.parts.feeders.tend(self.motion.active)
+        self.supplied |= self.parts.feeders.tend()
         if self.parts.joining.waiting and self.dropped is None:
             self.parts.joining.settle(self.time)
 

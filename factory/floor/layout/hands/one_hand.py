@@ -37,6 +37,7 @@ from factory.floor.layout.hands.places import Places, centre_of, strain_of_two
 from factory.floor.layout.hands.reach import halves
 from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.hands.tips import TipName, tip
+from factory.support.allowance import Allowance
 from factory.support.arrays import Array, Truth
 from factory.theory.problem.pag import NOPART
 
@@ -217,6 +218,7 @@ class OneHand:
         """The places for tips of a radius, or for the best tip at each if 0, for the label of a
         tour; whether each (n,) is clear in every frame, and whether the hand must be there
         first."""
+        Allowance.heed()
         label = self._label(tour)
         places = self.in_the_way.on_side(tour, kind, frames, radius)
         checks, first = self.in_the_way.checks(tour, label, kind, places, frames)
