@@ -60,9 +60,9 @@ def digest(*parts: object) -> str:
 
 
 @cache
-def program(folder: Path, *packages: str) -> str:
-    """A digest of the modules in a folder, and of the versions of packages that they use."""
-    modules = [path.read_bytes() for path in sorted(folder.glob("*.py"))]
+def program(folders: tuple[Path, ...], *packages: str) -> str:
+    """A digest of the modules in some folders, and of the versions of packages that they use."""
+    modules = [path.read_bytes() for folder in folders for path in sorted(folder.glob("*.py"))]
     return digest(*modules, *map(release, packages))
 
 

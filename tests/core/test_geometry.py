@@ -3,6 +3,8 @@ as drawn: what two have in common, by how much, and what one sweeps."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +14,14 @@ from manifold3d import Manifold
 
 from factory.floor.geometry.limits import METRES
 from factory.floor.geometry.meshes import MOST_FACES, usable
-from factory.floor.geometry.overlap import is_seen_near, may_share
+from factory.floor.geometry.overlap import MODULES, is_seen_near, may_share
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
 from factory.support.errors import InputError
 from factory.theory.problem.pag import PAG, Value
 from tests.layout_values import table_pag
+from tests.paths import ROOT
 
 
 def from_mesh(folder: Path, mesh: trimesh.Trimesh | str, **given: Value) -> Product:
@@ -109,3 +112,14 @@ def test_plates_that_lie_on_each_other_share_nothing_and_are_near(up, shares, ne
     other = plate.translate((0.3, 0.2, up))
     assert (may_share(plate, other), is_seen_near(plate, other)) == (shares, near)
     assert is_seen_near(plate, other, 0.02) == (up >= 1) or shares
+
+
+def test_what_is_kept_of_shapes_depends_on_all_modules_that_compute_it() -> None:
+    code = (
+        "import sys, factory.floor.geometry.product\n"
+        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('factory.')))"
+    )
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    folders = {Path(name).parent for name in names.stdout.split()}
+    theory = {folder for folder in folders if "theory" in folder.parts}
+    assert folders - theory - {ROOT / "factory", ROOT / "factory" / "floor"} <= {*MODULES}

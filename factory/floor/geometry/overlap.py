@@ -22,6 +22,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 from weakref import finalize
 
@@ -30,10 +31,16 @@ import numpy as np
 from factory.floor.geometry.distances import distances_to
 from factory.floor.geometry.pieces import closed_bodies
 from factory.floor.geometry.solids import Solid
+from factory.support import meshes
 from factory.support.arrays import Array, Indices
 from factory.support.meshes.bodies import connected
 from factory.support.meshes.triangles import is_closed, normals_of
 from factory.support.rotations import rotation
+
+SUPPORT = Path(meshes.__file__).parent
+
+MODULES = Path(__file__).parent, SUPPORT, SUPPORT.parent
+"""Folders of the modules that shapes depend on: what they computed is kept by their content."""
 
 ROUND = 5e-6
 """The largest deviation of the polytope that represents a round body [m]."""

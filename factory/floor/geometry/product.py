@@ -36,6 +36,7 @@ from factory.floor.geometry.meshes import (
     mend_remark,
     usable,
 )
+from factory.floor.geometry.overlap import MODULES
 from factory.floor.geometry.overlapping import stood_in
 from factory.floor.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.support.arrays import Array, Indices
@@ -246,7 +247,7 @@ class _Reader:
         path, scale = _file(node)
         try:
             content, suffix = self._content(path), Path(path).suffix.lower()
-            code = program(Path(__file__).parent, *PACKAGES)
+            code = program(MODULES, *PACKAGES)
             key = digest(content, suffix, scale, entered, self.decomposed, code)
             kept = _kept(key)
             if kept is not None:

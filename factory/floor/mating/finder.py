@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.floor.geometry import overlap
+from factory.floor.geometry.overlap import MODULES
 from factory.floor.geometry.solids import Product
 from factory.floor.mating.bodies import ROUNDING, BodyShapes, ConvexBodies, bodies
 from factory.floor.mating.boxes import box_depths
@@ -116,9 +116,9 @@ class Finder:
     def _product(self) -> str:
         """A digest of all that overlaps depend on."""
         where = self.meetings.borders, self.meetings.levels, self.meetings.splits
-        code = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
-        exact = program(Path(overlap.__file__).parent)
-        asked = code, exact, self.as_drawn, self.bodies.part
+        folders = Path(__file__).parent, *MODULES
+        code = program(folders, "numpy", "scipy", "shapely", "manifold3d")
+        asked = code, self.as_drawn, self.bodies.part
         return digest(*asked, *where, *self.bodies.vertices, *self._meshes)
 
     def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Pairs, Pairs, Flags]:
