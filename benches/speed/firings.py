@@ -16,9 +16,8 @@ from benches.speed.factories import DEFAULT, Case
 from benches.speed.movers import RIVALS
 from benches.speed.processes import ROOT, interleaved, median, ratio, run
 from benches.tables import table
-from factory.engine.timing.timed import Timed, timed
+from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
-from factory.theory.nets.earliest import earliest_firings
 
 PROGRAM = ROOT / "benches" / "rivals" / "simpy_firings.py"
 
@@ -40,7 +39,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
 
 def _compared(folder: Path, name: str, runs: int) -> dict[str, Any]:
     case = Case(CASES[name], None, example=None if name == "balanced" else name)
-    net, file = timed(Timing(case.layout(), DEFAULT)), folder / f"{name}.json"
+    net, file = Timed.of(Timing(case.layout(), DEFAULT)), folder / f"{name}.json"
     file.write_text(json.dumps(_written(net)))
     our, their = interleaved([partial(ours, net), partial(theirs, file)], runs)
     off = np.abs(np.array(our[0].pop("dates")) - np.array(their[0].pop("dates")).T).max()
@@ -73,7 +72,7 @@ def _written(timed: Timed) -> dict[str, Any]:
 def ours(timed: Timed) -> dict[str, Any]:
     """The dates by the recursion, and the processor time [s]."""
     begin = process_time()
-    dates = earliest_firings(timed.net, timed.seconds, PERIODS, timed.timing.first, timed.ready)
+    dates = timed.firings(PERIODS * timed.timing.factory.period)
     return {"s": process_time() - begin, "dates": dates.tolist()}
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Mapping
-from inspect import isclass, isfunction, ismodule, signature
+from inspect import isclass, isfunction, ismodule, signature, unwrap
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -241,7 +241,7 @@ def interface() -> str:
     lines = [heading(1, "Interface"), prose(docstring(api))]
     for home, names in api.HOMES.items():
         for name in names.split():
-            subject = getattr(api, name)
+            subject = unwrap(getattr(api, name))
             lines.append(heading(2, name))
             if isfunction(subject):
                 lines.append(code(f"{name}{signature(subject)}", "python"))

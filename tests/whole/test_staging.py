@@ -51,7 +51,8 @@ def test_ways_in_the_timed_net(paper: Layout) -> None:
     net = timed_net(timing, Change(copies={2: 3}))
     assert {key[0]: net.net.tokens[place] for key, place in net.ways.items()} == {0: 1, 2: 3}
     assert set(net.ready) == set(net.ways.values())
-    late = replace(net, ready=dict.fromkeys(net.ready, 50.0))
+    late = replace(net)
+    vars(late)["ready"] = dict.fromkeys(net.ready, 50.0)
     for _, number in net.ways:
         end = timing.factory.operations[number].end
         assert net.firings(1)[0, end] < 50.0 <= late.firings(1)[0, end]

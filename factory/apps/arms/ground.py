@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -110,6 +110,6 @@ def cell_of(project: Project, model: ArmModel, arms: tuple[CellArm, ...]) -> Cel
     made = armed(project, model, arms)
     piles = made.pag.root, *piles_of(made.pag)
     rails = {pile: on_rails(project, made.pag, pile) for pile in piles}
-    values = {name: getattr(made, name) for name in made.__dataclass_fields__}
+    values = {one.name: getattr(made, one.name) for one in fields(made)}
     ground = CellGround(model=model, arms=arms, source=project, rails=rails)
     return CellProject(**{**values, "ground": ground})

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -39,7 +39,7 @@ FACTORY = [sys.executable, "-m", "factory"]
 
 def recipe_of(kind: type[Recipe] = Recipe, **fixed: Value) -> Recipe:
     project = read(PAPER)
-    settings = {name: getattr(Settings(), name) for name in Settings.__dataclass_fields__}
+    settings = {one.name: one.default for one in fields(Settings)}
     return kind(project.plain, project.product, {**settings, "world": "ideal", **fixed})
 
 
