@@ -20,10 +20,14 @@ BY_A_BROWSER = ("report.png", "view.png")
 """Pictures of pages, which a browser draws."""
 
 
-def digest(folder: Path = ROOT / "factory" / "film") -> str:
-    """The digest of all modules of a folder."""
+FOLDERS = "film", "support/pictures"
+"""Folders of the modules that draw."""
+
+
+def digest(package: Path = ROOT / "factory") -> str:
+    """The digest of all modules that draw."""
     found = sha256()
-    for path in sorted(folder.glob("*.py")):
+    for path in sorted(path for folder in FOLDERS for path in (package / folder).glob("*.py")):
         found.update(ast.dump(_essence(ast.parse(path.read_text("utf-8")))).encode())
     return found.hexdigest()[:16]
 
