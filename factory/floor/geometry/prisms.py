@@ -90,9 +90,15 @@ def _levels(vertices: Array, faces: Indices) -> list[float]:
     upright = np.abs(normals[:, 2]) <= SQUARE * np.linalg.norm(normals, axis=1)
     if not (upright | (np.ptp(heights, axis=1) <= EXACT)).all():
         return []
+    return distinct(heights, EXACT)
+
+
+def distinct(heights: Array, apart: float) -> list[float]:
+    """Heights in ascending order; those that are nearer than a distance to the next are one, their
+    mean."""
     each = np.sort(heights, axis=None)
-    levels = np.split(each, np.flatnonzero(np.diff(each) > EXACT) + 1)
-    return [float(level.mean()) for level in levels]
+    groups = np.split(each, np.flatnonzero(np.diff(each) > apart) + 1)
+    return [float(group.mean()) for group in groups]
 
 
 def _stacked(body: Any, levels: Sequence[float]) -> Iterator[tuple[Array, float, float]]:
@@ -115,17 +121,21 @@ def _same(one: Any, other: Any) -> bool:
 
 def _convex(section: Any) -> list[Array]:
     """Convex polygons (n, 2) that make up a cross-section."""
+    points, loops = convex_loops(section)
+    return [points[list(loop)] for loop in loops]
+
+
+def convex_loops(section: Any) -> tuple[Array, list[Loop]]:
+    """The corners (n, 2) of a cross-section, and convex polygons of them that make it up."""
     from manifold3d import triangulate
 
     contours = section.to_polygons()
-    if not contours:
-        return []
-    points = np.concatenate(contours)
-    triangles = triangulate(contours).tolist()
-    return [points[list(loop)] for loop in joined_loops(points, [tuple(t) for t in triangles])]
+    points = np.concatenate([np.zeros((0, 2)), *contours])
+    triangles = triangulate(contours).tolist() if contours else []
+    return points, _joined(points, [tuple(corners) for corners in triangles])
 
 
-def joined_loops(points: Array, loops: list[Loop]) -> list[Loop]:
+def _joined(points: Array, loops: list[Loop]) -> list[Loop]:
     """Convex polygons, joined across common sides as far as the results are convex."""
     owner = {side: number for number, loop in enumerate(loops) for side in sides_of(loop)}
     common = [(u, v) for u, v in owner if u < v and (v, u) in owner]

@@ -20,7 +20,15 @@ from typing import Any
 import numpy as np
 
 from factory.floor.geometry.overlap import bounded
-from factory.floor.geometry.prisms import SQUARE, Loop, frames, joined_loops, prism, sides_of
+from factory.floor.geometry.prisms import (
+    SQUARE,
+    Loop,
+    convex_loops,
+    distinct,
+    frames,
+    prism,
+    sides_of,
+)
 from factory.support.arrays import Array, Indices
 from factory.support.meshes.triangles import normals_of
 
@@ -92,9 +100,7 @@ def _levels(vertices: Array, faces: Indices) -> list[float]:
     normals = normals_of(vertices, faces)
     flat = np.abs(normals[:, 2]) >= (1 - SQUARE**2) * np.linalg.norm(normals, axis=1)
     ends = vertices[:, 2].min(), vertices[:, 2].max()
-    heights = np.sort([*ends, *vertices[faces[flat], 2].mean(axis=1)])
-    groups = np.split(heights, np.flatnonzero(np.diff(heights) > LEVEL) + 1)
-    return [float(group.mean()) for group in groups]
+    return distinct(np.array([*ends, *vertices[faces[flat], 2].mean(axis=1)]), LEVEL)
 
 
 def _stacked(body: Any, levels: Sequence[float], allowed: float) -> list[Slab]:
@@ -147,13 +153,7 @@ def _without_narrow_holes(section: Any, width: float) -> Any:
 
 def _convex(section: Any, allowed: float) -> list[Array]:
     """Convex polygons (n, 2) that cover a section and are outside of it by less than allowed."""
-    from manifold3d import triangulate
-
-    contours = section.to_polygons()
-    if not contours:
-        return []
-    points = np.concatenate(contours)
-    loops = joined_loops(points, [tuple(t) for t in triangulate(contours).tolist()])
+    points, loops = convex_loops(section)
     return _Merging(section, allowed, [points[list(loop)] for loop in loops], loops).merged()
 
 
