@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from benches.fidelity.products import over_cores
 from benches.tables import table
 from factory.apps.log.reader import read_log
 from tests.apps.resume.test_resume import FACTORIES, killed_and_gone_on, ticks_of
@@ -21,29 +21,31 @@ RUNS = (*((words, "") for words in FACTORIES), *((words, FAULTS) for words in FA
 """The words of each run, and the file of its faults, "" for none."""
 
 
-def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
+def measure(quick: bool = False) -> dict[str, Any]:
     """Kill each run again and again, as the tests in tests/apps/resume do."""
-    rows = list[dict[str, Any]]()
-    for number, (given, faults) in enumerate(RUNS[:1] if quick else RUNS):
-        kills = 1 if quick else KILLS
-        with TemporaryDirectory() as folder:
-            file = Path(folder) / "faults.toml"
-            file.write_text(faults)
-            shown = (*given, "--faults", file) if faults else given
-            words = *shown, "--seed", number
-            whole = Path(folder) / "whole.log"
-            assert spawn("run", *words, "--log", whole, "-q").status == 0
-            size, chance = whole.stat().st_size, Random(number)
-            came = killed_and_gone_on(Path(folder), words, kills, chance, size)
-            rows.append(
-                {
-                    "run": " ".join(Path(str(word)).name for word in shown),
-                    "lasts_s": float(read_log(whole).time[-1]),
-                    "from_s": came,
-                    "same": ticks_of(Path(folder) / "run.log") == ticks_of(whole),
-                }
-            )
-        yield {"rows": rows}
+    cases = [(n, 1 if quick else KILLS) for n in range(1 if quick else len(RUNS))]
+    return {"rows": over_cores(killed, cases)}
+
+
+def killed(case: tuple[int, int]) -> dict[str, Any]:
+    """What came of a run, by its number, that is killed so many times."""
+    number, kills = case
+    given, faults = RUNS[number]
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "faults.toml"
+        file.write_text(faults)
+        shown = (*given, "--faults", file) if faults else given
+        words = *shown, "--seed", number
+        whole = Path(folder) / "whole.log"
+        assert spawn("run", *words, "--log", whole, "-q").status == 0
+        size, chance = whole.stat().st_size, Random(number)
+        came = killed_and_gone_on(Path(folder), words, kills, chance, size)
+        return {
+            "run": " ".join(Path(str(word)).name for word in shown),
+            "lasts_s": float(read_log(whole).time[-1]),
+            "from_s": came,
+            "same": ticks_of(Path(folder) / "run.log") == ticks_of(whole),
+        }
 
 
 def section(results: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benches.fidelity.products import CAMPAIGN, layout
+from benches.fidelity.products import CAMPAIGN, layout, over_cores
 from benches.tables import table
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
@@ -260,14 +260,20 @@ def chosen(plan: Layout) -> list[int]:
 
 def measure(quick: bool = False) -> dict:
     """Starts in the domain of one mode of each template of each product."""
-    count, modes = (5 if quick else 40), []
-    for name in CAMPAIGN[:1] if quick else CAMPAIGN:
-        plan = layout(name)
-        for number in chosen(plan):
-            operation = plan.factory.operations[number]
-            outcomes = try_mode(plan, number, count)
-            modes.append(summary(name, operation.template.name, operation.label, outcomes))
-    return {"starts_of_each_kind": count, "modes": modes}
+    count = 5 if quick else 20
+    products = CAMPAIGN[:1] if quick else CAMPAIGN
+    cases = [(name, number, count) for name in products for number in chosen(layout(name))]
+    return {"starts_of_each_kind": count, "modes": over_cores(tried, cases)}
+
+
+def tried(case: tuple[str, int, int]) -> dict:
+    """What came of an operation's mode, by the name of its product and its number, from so many
+    starts of each kind."""
+    name, number, count = case
+    plan = layout(name)
+    operation = plan.factory.operations[number]
+    outcomes = try_mode(plan, number, count)
+    return summary(name, operation.template.name, operation.label, outcomes)
 
 
 def summary(product: str, template: str, label: str, outcomes: Sequence[Outcome]) -> dict:

@@ -24,7 +24,7 @@ from factory.support.settings import Settings
 ERROR_MM = 0.5
 """The largest product error [mm] of a good product."""
 
-UNITS = 3
+UNITS = 2
 """Products made in a run."""
 
 SETTINGS = Settings(timestep=0.002)

@@ -1,6 +1,6 @@
 """Long runs: nothing drifts, and no copy of a part is lost.
 
-300 units of the paper's example and 50 of a real product, in one run each. For every unit: product
+300 units of the paper's example and 40 of a real product, in one run each. For every unit: product
 error, largest hand-off gap and weld residual since the last dropoff, and the interval. The first
 ten are the first after the factory has filled, the last ten the last before it runs empty.
 
@@ -21,14 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from benches.fidelity.products import PAPER, REAL, layout
+from benches.fidelity.products import PAPER, REAL, layout, over_cores
 from benches.tables import table
 from factory.engine.mjcf import names
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 
-RUNS = ((PAPER, 300), *((name, 50) for name in REAL))
+RUNS = ((PAPER, 300), *((name, 40) for name in REAL))
 
 TEN = 10
 
@@ -133,8 +133,9 @@ def growth(memory: Sequence[float]) -> float:
     return float(np.polyfit(np.arange(len(later)), later, 1)[0]) if len(later) > 1 else 0.0
 
 
-def long_run(product: str, units: int) -> dict:
-    """One run, and what became of its figures."""
+def long_run(case: tuple[str, int]) -> dict:
+    """So many units of a product in one run, and what became of its figures."""
+    product, units = case
     gc.collect()
     simulation = Simulation(layout(product), RunRequest(units=units))
     assert simulation.model is not None
@@ -188,7 +189,7 @@ def faults(found: Mapping[str, Any]) -> list[str]:
 
 def measure(quick: bool = False) -> dict:
     """The long runs; 30 units of the first if it is to be quick."""
-    return {"runs": [long_run(*run) for run in ([(PAPER, 30)] if quick else RUNS)]}
+    return {"runs": over_cores(long_run, [(PAPER, 30)] if quick else RUNS)}
 
 
 def section(results: dict) -> str:
