@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.apps.few_robots.aim import Least, least_of, least_robots
+from factory.apps.few_robots.aim import Least, least_of
 from factory.engine.timing.pool import part_pool
 from factory.pipeline import Project
 from factory.support.errors import Diagnostic
@@ -111,7 +111,8 @@ class Checked:
         if self.factory is None:
             return {}
         factory = self.factory
-        lines = [(robot.name, factory.deliveries(robot.index)) for robot in factory.robots]
+        several = [r for r, tours in zip(factory.robots, factory.tours, strict=True) if tours[1:]]
+        lines = [(robot.name, factory.deliveries(robot.index)) for robot in several]
         return {
             **({"least_robots": self.least.total} if self.least else self._mix(factory)),
             "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
@@ -167,20 +168,11 @@ def check_project(project: Project, wip: int | None = None, laid_out: bool = Fal
         project.warnings,
         project.no_grips,
         factory,
-        _least(project),
+        None if project.pag.mix else least_of(project.compiled, project.templates),
         _coordinated(project) if laid_out or project.ground.reach_bound else None,
         tuple(len(one.compiled.robots) for one in project.each),
         project.ground.machines,
     )
-
-
-def _least(project: Project) -> Least | None:
-    """The least number of robots for a product as it is written; None for a mix."""
-    if project.pag.mix is not None:
-        return None
-    if project.plan.forms:
-        return least_robots(project.pag, project.templates)
-    return least_of(project.compiled)
 
 
 def _coordinated(project: Project) -> CoordinatedNet:

@@ -65,9 +65,11 @@ def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     return _least({n.label: (n.template, n.inputs) for n in nodes}, pag.products)
 
 
-def least_of(factory: Factory) -> Least:
-    """The bound for the product of a factory with a robot for each tour, in the forms that its
-    plan has."""
+def least_of(factory: Factory, templates: Mapping[str, Template]) -> Least:
+    """The bound for the product of a factory with a robot for each tour: the same, from its
+    operations where they are in the forms that are written."""
+    if factory.plan.forms:
+        return least_robots(factory.pag, templates)
     made = reversed(factory.making)
     return _least({o.label: (o.template, o.taken) for o in made}, factory.products)
 
