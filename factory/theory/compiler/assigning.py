@@ -19,7 +19,7 @@ from itertools import accumulate
 from factory.support.errors import Diagnostic, InputError
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
-from factory.theory.nets.threaded import Slot, ThreadedNet
+from factory.theory.nets.threaded import Redistribution, Slot, ThreadedNet
 from factory.theory.plant.factory import NO_PARENT, Factory
 from factory.theory.plant.gripping import with_closing
 from factory.theory.plant.operation import Operation
@@ -40,11 +40,24 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     as `r2:part1`. The empty-handed waits of a robot with several tours are told apart by the
     operation to come, `r2:nopart/part3`.
     """
+    net, redistribution, gears, slots = _wired(robots, operations)
+    initial = tuple(gear.places[0] for gear in gears)
+    return GearNet(ThreadedNet(net, redistribution), gears, initial, slots)
+
+
+Wired = tuple[
+    PetriNet, tuple[Redistribution, ...], tuple[Gear, ...], tuple[tuple[RobotId, ...], ...]
+]
+"""A net with its redistribution functions, its gears, and the slots of its places."""
+
+
+def _wired(robots: Sequence[Robot], operations: Sequence[Operation]) -> Wired:
+    """What `gear_net` is made of: nothing else of its wiring is kept."""
     wiring = _Wiring(operations)
     for robot in robots:
         wiring.add(robot)
-    initial = tuple(gear.places[0] for gear in wiring.gears)
-    return GearNet(wiring.net(), tuple(wiring.gears), initial, tuple(wiring.slots))
+    net = PetriNet(wiring.transitions, tuple(wiring.places))
+    return net, wiring.redistribution(), tuple(wiring.gears), tuple(wiring.slots)
 
 
 class _Wiring:
@@ -97,11 +110,11 @@ class _Wiring:
             last, left = o, role
         self.gears.append(Gear(robot.name, robot.type, tuple(places), tuple(events)))
 
-    def net(self) -> ThreadedNet:
-        """The net, once all robots are added."""
+    def redistribution(self) -> tuple[Redistribution, ...]:
+        """d_e of each event, once all robots are added."""
         ended = map(zip, self.acting, self.ended)
-        each = [tuple(pairs) for both in zip(self.begun, ended, strict=True) for pairs in both]
-        return ThreadedNet(PetriNet(self.transitions, tuple(self.places)), tuple(each))
+        both = zip(self.begun, ended, strict=True)
+        return tuple([tuple(pairs) for events in both for pairs in events])
 
 
 def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:
