@@ -5,6 +5,8 @@ The commands here know the core and what goes with its runs; apps give the other
 
 from __future__ import annotations
 
+import atexit
+import gc
 import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -65,6 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not sys.warnoptions:  # what libraries warn programmers of is shown with `python -W default`
         simplefilter("ignore")
     stop_on_signals(interrupt)
+    atexit.register(gc.freeze)  # no search for cycles in what goes with the process
     status = run_command(words)
     try:
         sys.stdout.flush()

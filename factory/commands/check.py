@@ -196,7 +196,7 @@ def _describe(checked: Checked, verbose: bool, allowed: Sequence[AllowedOverlap]
     from factory.support.texts import counted
 
     counts, gears = checked.counts(), checked.verdict.gears
-    shown = checked.gears(None if verbose else SHOWN)
+    shown = [*checked.gears(None if verbose else SHOWN)]
     rows = (
         (g["robot"], g["type"], _modes(g["places"], len(g["places"]) if verbose else MODES))
         for g in shown

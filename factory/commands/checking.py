@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.apps.few_robots.aim import Least, least_robots
+from factory.apps.few_robots.aim import Least, least_of
 from factory.engine.timing.pool import part_pool
 from factory.pipeline import Project
 from factory.support.errors import Diagnostic
@@ -62,13 +62,13 @@ class Checked:
             "largest_mode": max((place.size for place in subject.net.places), default=0),
         }
 
-    def gears(self, most: int | None = None) -> list[dict[str, Any]]:
+    def gears(self, most: int | None = None) -> Iterator[dict[str, Any]]:
         """The gears as `check --json` lists them: all, or `most` of them."""
         places = marked(self.net).net.places
-        return [_gear_json(gear, places) for gear in self.verdict.gears[:most]]
+        return (_gear_json(gear, places) for gear in self.verdict.gears[:most])
 
     def as_json(self) -> dict[str, Any]:
-        """The keys of `check --json`."""
+        """The keys of `check --json`, for `emit`."""
         blocked = self.matings.of_kind("blocked") if self.matings else ()
         no_grips = None if self.no_grips is None else [miss.as_json() for miss in self.no_grips]
         return {
@@ -111,7 +111,8 @@ class Checked:
         if self.factory is None:
             return {}
         factory = self.factory
-        lines = [(robot.name, factory.deliveries(robot.index)) for robot in factory.robots]
+        several = [r for r, tours in zip(factory.robots, factory.tours, strict=True) if tours[1:]]
+        lines = [(robot.name, factory.deliveries(robot.index)) for robot in several]
         return {
             **({"least_robots": self.least.total} if self.least else self._mix(factory)),
             "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
@@ -167,7 +168,7 @@ def check_project(project: Project, wip: int | None = None, laid_out: bool = Fal
         project.warnings,
         project.no_grips,
         factory,
-        None if project.pag.mix else least_robots(project.pag, project.templates),
+        None if project.pag.mix else least_of(project.compiled, project.templates),
         _coordinated(project) if laid_out or project.ground.reach_bound else None,
         tuple(len(one.compiled.robots) for one in project.each),
         project.ground.machines,

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from itertools import zip_longest
+from itertools import islice, zip_longest
 from math import isfinite
 from shutil import get_terminal_size
 from textwrap import wrap
@@ -34,19 +34,44 @@ WIDTH = 160
 FILLER = "\0"
 """Stands for the second column of a wide character."""
 
+BLOCK = 1000
+"""So many elements of a long list are printed at a time."""
+
 STDOUT = "what is printed"
 """The name of stdout in messages."""
 
 
 def emit(document: Mapping[str, Any]) -> None:
     """Print one JSON document to stdout, in ASCII whatever the locale, with null for numbers that
-    are not finite."""
-    document = {"schema": SCHEMA, **document}
+    are not finite. What an iterator gives is a list, of which only `BLOCK` elements are kept at a
+    time."""
+    mark = "{"
+    with _named():
+        for key, value in {"schema": SCHEMA, **document}.items():
+            print(f"{mark}{json.dumps(key)}: ", end="")
+            pieces = _listed(value) if isinstance(value, Iterator) else (_text(value),)
+            for piece in pieces:
+                print(CONTROL.sub(" ", piece), end="")
+            mark = ", "
+        print("}")
+
+
+def _listed(values: Iterator[Any]) -> Iterator[str]:
+    """A list of values in JSON, in pieces."""
+    mark = ""
+    yield "["
+    while block := [*islice(values, BLOCK)]:
+        yield mark + _text(block)[1:-1]
+        mark = ", "
+    yield "]"
+
+
+def _text(value: Any) -> str:
+    """A value in JSON."""
     try:
-        text = json.dumps(document, allow_nan=False)
+        return json.dumps(value, allow_nan=False)
     except ValueError:
-        text = json.dumps(finite(document), allow_nan=False)
-    say(text)
+        return json.dumps(finite(value), allow_nan=False)
 
 
 def finite(value: Any) -> Any:

@@ -9,13 +9,13 @@ program needs fewer, folded or not: a robot holds each part and sub-assembly unt
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Node, Template, expand
+from factory.api import NOPART, PAG, Factory, Template, expand
 from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
 
@@ -54,30 +54,46 @@ class Least:
         return f" ({words}{more})" if steps else ""
 
 
+Joins = Mapping[str, tuple[Template, Sequence[str]]]
+"""For each label the template that makes it, of which inputs: each after its inputs."""
+
+
 def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     """The bound for a product; for a mix, of the product that needs most, with the tools of all.
     Linear."""
-    nodes = expand(pag, templates)
+    nodes = expand(pag, templates).values()
+    return _least({n.label: (n.template, n.inputs) for n in nodes}, pag.products)
+
+
+def least_of(factory: Factory, templates: Mapping[str, Template]) -> Least:
+    """The bound for the product of a factory with a robot for each tour: the same, from its
+    operations where they are in the forms that are written."""
+    if factory.plan.forms:
+        return least_robots(factory.pag, templates)
+    made = reversed(factory.making)
+    return _least({o.label: (o.template, o.taken) for o in made}, factory.products)
+
+
+def _least(joins: Joins, products: Sequence[str]) -> Least:
+    """The bound for products."""
     needs: dict[str, int] = {}
-    for label, node in nodes.items():
-        needs[label] = _needed(node, templates, sorted(needs[x] for x in node.inputs))
-    tools = {
-        (node.template.name, slot) for node in nodes.values() for slot in node.template.tools()
-    }
-    root = label = max(pag.products, key=needs.__getitem__)
+    for label, (template, inputs) in joins.items():
+        needs[label] = _needed(template, sorted([needs[x] for x in inputs]))
+    used = {template.name: template for template, _ in joins.values()}
+    root = label = max(products, key=needs.__getitem__)
     path = [(root, needs[root])]
-    while nodes[label].inputs and needs[label] > 1:
-        label = max(nodes[label].inputs, key=lambda x: needs[x])
+    while (inputs := joins[label][1]) and needs[label] > 1:
+        label = max(inputs, key=lambda x: needs[x])
         path.append((label, needs[label]))
-    return Least(needs[root], len(tools), tuple(path))
+    return Least(needs[root], sum(len(template.tools()) for template in used.values()), tuple(path))
 
 
-def _needed(node: Node, templates: Mapping[str, Template], inputs: list[int]) -> int:
-    """How many robots it takes to hold what a node makes, while it is made."""
+def _needed(template: Template, inputs: list[int]) -> int:
+    """How many robots it takes to hold what a template makes of inputs that need so many each, in
+    ascending order, while it is made."""
     if not inputs:
         return 1
     needed = max(count + n for n, count in enumerate(reversed(inputs)))
-    template = node.template
     takes_over = template.held == NOPART and not template.instead
     return max(needed, len(inputs) + 1) if takes_over else needed
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from typing import TypeAlias
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf.arrays import Fingerprint, fingerprint_of
 from factory.engine.mjcf.model import Model
@@ -75,27 +76,33 @@ def _by_pieces(xml: str, files: Mapping[str, bytes]) -> mujoco.MjModel:
     root = ElementTree.fromstring(xml)
     world, shared = root.find("worldbody"), [root.find("compiler"), root.find("default")]
     assert world is not None
-    pieces: list[list[ElementTree.Element]] = [[]]
-    size = 0
-    for body in world.findall("body"):
+    bodies = world.findall("body")
+    for body in bodies:
         world.remove(body)
-        size += sum(1 for _ in body.iter())
-        pieces[-1].append(body)
-        if size > PIECE:
-            size = 0
-            pieces.append([])
     spec = mujoco.MjSpec.from_string(_text(root), assets=dict(files))
+    del root, world  # the engine's own copy takes their room
     with unwarned():  # that names could clash: here they are those of one model
-        for bodies in pieces:
-            piece = ElementTree.Element("mujoco")
+        for some in _blocks(bodies):
+            piece = Element("mujoco")
             piece.extend(part for part in shared if part is not None)
-            ElementTree.SubElement(piece, "worldbody").extend(bodies)
+            ElementTree.SubElement(piece, "worldbody").extend(some)
             child = mujoco.MjSpec.from_string(_text(piece))
             spec.attach(child, prefix="", frame=spec.worldbody.add_frame())
         return spec.compile()
 
 
-def _text(root: ElementTree.Element) -> str:
+def _blocks(bodies: list[Element]) -> Iterator[list[Element]]:
+    """Bodies with PIECE elements, or a body more, at a time; they are taken out of the list."""
+    bodies.reverse()
+    while bodies:
+        some, size = list[Element](), 0
+        while bodies and size <= PIECE:
+            some.append(bodies.pop())
+            size += sum(1 for _ in some[-1].iter())
+        yield some
+
+
+def _text(root: Element) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 

@@ -77,8 +77,9 @@ def add_number(body: Element, asset: Element, robot: str, path: Guidepath, role:
     corners = np.concatenate([*_texts(digits, half, path)]) + middle
     faces = (4 * np.arange(len(corners) // 4)[:, None] + [0, 1, 2, 0, 2, 3]).ravel()
     name = f"number/{robot}"
-    places = " ".join(f"{value:.5g}" for value in np.round(corners, 5).ravel().tolist())
-    add(asset, "mesh", name=name, inertia="shell", vertex=places, face=numbers(faces))
+    places = np.round(corners, 5).ravel().tolist()
+    vertices = " ".join(["%.5g"] * len(places)) % tuple(places)
+    add(asset, "mesh", name=name, inertia="shell", vertex=vertices, face=numbers(faces))
     shell = next((b for b in body.findall("body") if b.get("name") == f"{robot}/shell"), body)
     add_shown(shell, f"{robot}/number", "mesh", mesh=name, rgba=INKS.get(role, LIGHT))
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -23,8 +22,8 @@ from factory.support.allowance import Allowance
 from factory.support.arrays import Array, Index, Indices, Truth
 
 BLOCK = 1 << 14
-"""Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of
-presences."""
+"""Boxes, and pairs of boxes, that are compared at a time, but for those of one pair of presences,
+and those of one box."""
 
 Meeting = tuple[Array, Index, Index]
 """Pairs of boxes (n,) of two presences: what they need [m], and the numbers of both."""
@@ -103,19 +102,25 @@ class _Boxes:
         (first, second), most = pairs.T, needed.max(axis=1)
         here = self._within(first, self._hulls[second], most)
         there = self._within(second, self._hulls[first], most)
-        for some in _combined(here, there, len(pairs)):
-            pair, one, other = self._close(*some, most)
-            lacking = _overlap(self._boxes[one], self._boxes[other])
-            lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
-            meets = lacking > ROUNDING
-            pair, one, other = pair[meets], one[meets], other[meets]
-            lacking = lacking[meets]
-            order = np.lexsort((other, one, lacking, pair))
-            is_last = np.append(np.diff(pair[order]) > 0, True)[: len(order)]
-            for n in order[is_last].tolist():
-                mine, others = both[pair[n]]
-                i, j = one[n] - self._first[first[pair[n]]], other[n] - self._first[second[pair[n]]]
-                yield Near(mine, others, (mine.name(i), others.name(j)), float(lacking[n]))
+        blocks = [self._lacking(*some, needed) for some in _combined(here, there, len(pairs))]
+        pair, lacking, one, other = _greatest(
+            *(np.concatenate(each) for each in zip(*blocks, strict=True))
+        )
+        one, other = one - self._first[first[pair]], other - self._first[second[pair]]
+        for n, i, j, lacks in zip(*(a.tolist() for a in (pair, one, other, lacking)), strict=True):
+            mine, others = both[n]
+            yield Near(mine, others, (mine.name(i), others.name(j)), lacks)
+
+    def _lacking(
+        self, pair: Index, one: Index, other: Index, needed: Array
+    ) -> tuple[Index, Array, Index, Index]:
+        """Those of the boxes of pairs (m,) that come nearer than they may, where pairs need
+        distances (n, 3), and by how much: the nearest of each pair."""
+        pair, one, other = self._close(pair, one, other, needed.max(axis=1))
+        lacking = _overlap(self._boxes[one], self._boxes[other])
+        lacking += needed[pair, _needed(self._layers[one], self._layers[other])]
+        meets = lacking > ROUNDING
+        return _greatest(pair[meets], lacking[meets], one[meets], other[meets])
 
     def _close(
         self, pair: Index, one: Index, other: Index, apart: Array
@@ -141,15 +146,24 @@ class _Boxes:
 def _combined(
     here: tuple[Index, Index], there: tuple[Index, Index], pairs: int
 ) -> Iterator[tuple[Index, Index, Index]]:
-    """Every box of one presence with every box of the other, for BLOCK of them at a time and pair
-    by pair: the numbers of the pair and of the boxes (m,). `here`, `there`: as `_within`."""
-    mine, others = (np.bincount(pair, minlength=pairs) for pair, _ in (here, there))
-    first, block = np.cumsum(others) - others, np.cumsum(mine * others) // BLOCK
-    ends = np.searchsorted(block[here[0]], np.arange(block[-1] + 2))
-    for begin, end in pairwise(ends.tolist()):
-        pair, one = here[0][begin:end], here[1][begin:end]
-        span, other = _spans(first[pair], others[pair])
+    """Every box of one presence with every box of the other, for some BLOCK of them at a time and
+    pair by pair: the numbers of the pair and of the boxes (m,). `here`, `there`: as `_within`."""
+    others = np.bincount(there[0], minlength=pairs)
+    first, count = np.cumsum(others) - others, others[here[0]]
+    block = np.cumsum(count) // BLOCK
+    for some in np.split(np.arange(len(count)), np.flatnonzero(np.diff(block)) + 1):
+        pair, one = here[0][some], here[1][some]
+        span, other = _spans(first[pair], count[some])
         yield pair[span], one[span], there[1][other]
+
+
+def _greatest(
+    pair: Index, lacking: Array, one: Index, other: Index
+) -> tuple[Index, Array, Index, Index]:
+    """What lacks most of each pair, of its boxes (m,); of equal ones the last."""
+    order = np.lexsort((other, one, lacking, pair))
+    last = order[np.append(np.diff(pair[order]) > 0, True)[: len(order)]]
+    return pair[last], lacking[last], one[last], other[last]
 
 
 def _spans(first: Index, count: Index) -> tuple[Index, Index]:
@@ -192,12 +206,12 @@ def judged(one: Presence, other: Presence, needed: Distances) -> Lacking | None:
 def nearest(one: Presence, other: Presence, boxes: Meeting) -> Lacking | None:
     """Of some boxes of two presences those whose bodies come nearer than they may, and by how much;
     edges count only if faces do not decide."""
-    need, here, there = boxes
-    if not len(need):
+    needs, here, there = boxes
+    if not len(needs):
         return None
-    by_box = need + _overlap(one.boxes[here], other.boxes[there])
-    pairs = sorted(zip(by_box.tolist(), here.tolist(), there.tolist(), strict=True), reverse=True)
-    for lacking, i, j in pairs:
+    by_box = needs + _overlap(one.boxes[here], other.boxes[there])
+    for n in np.lexsort((there, here, by_box))[::-1].tolist():
+        lacking, i, j = float(by_box[n]), int(here[n]), int(there[n])
         if lacking <= ROUNDING:
             return None
         need = lacking - float(_overlap(one.boxes[i], other.boxes[j]))
@@ -237,6 +251,17 @@ def meeting(one: Presence, other: Presence, needed: Distances) -> Meeting:
         there = _within(other.boxes, one.hull, max(needed)) if len(here) else here
         if not len(there):
             return np.zeros(0), here[:0], there
+    rows = max(1, BLOCK // max(1, len(there)))
+    blocks = [
+        _met(one, here[begin : begin + rows], other, there, needed)
+        for begin in range(0, max(1, len(here)), rows)
+    ]
+    need, i, j = (np.concatenate(each) for each in zip(*blocks, strict=True))
+    return need, i, j
+
+
+def _met(one: Presence, here: Index, other: Presence, there: Index, needed: Distances) -> Meeting:
+    """The same of some of their boxes."""
     need = np.array(needed)[_needed(one.layers[here][:, None], other.layers[there][None])]
     lacking = need + _overlap(one.boxes[here][:, None], other.boxes[there][None])
     i, j = np.nonzero(lacking > ROUNDING)

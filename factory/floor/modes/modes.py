@@ -31,11 +31,15 @@ from factory.theory.problem.template import Point, Template
 
 
 def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
-    """F_p, D_p and G_p of every operation, in arc length.
+    """F_p, D_p and G_p of every operation, in arc length, computed once for a layout.
 
     Raises InputError (NotPrepared) where the operations before leave the robots outside the domain
     of a mode, or where one may hold another up for ever.
     """
+    return layout.kept(_modes, eps)
+
+
+def _modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     operations = layout.factory.operations
     modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
     starts = operation_starts(layout)

@@ -24,10 +24,13 @@ from factory.theory.plant.factory import NO_PARENT, Factory
 from factory.theory.plant.gripping import with_closing
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
-from factory.theory.problem.ids import OperationId, PlaceId, RobotId, TransitionId, end_of
+from factory.theory.problem.ids import OperationId, PlaceId, RobotId, TransitionId
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import Plan, in_turn, out_of_turn
 from factory.theory.problem.robot_types import LIFT, Catalogue
+
+Events = tuple[TransitionId, ...]
+"""Transitions before or after a place."""
 
 
 def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
@@ -42,63 +45,76 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     return GearNet(ThreadedNet(net, redistribution), gears, initial, slots)
 
 
-def _wired(
-    robots: Sequence[Robot], operations: Sequence[Operation]
-) -> tuple[PetriNet, tuple[Redistribution, ...], tuple[Gear, ...], tuple[tuple[RobotId, ...], ...]]:
-    """The net of `gear_net`, its redistribution functions, its gears, and its slots."""
-    transitions = tuple(
-        Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
-    )
-    numbers = [(TransitionId(event),) for event in range(len(transitions))]  # each made once
-    places = [
-        Place(
-            o.label,
-            numbers[o.start],
-            numbers[o.end],
-            o.template.name,
-            "" if o.after[o.template.carrier - 1] == NOPART else o.label,
-            len(o.robots),
-            o.position,
-        )
-        for o in operations
-    ]
-    slots = [o.robots for o in operations]
-    acting: list[list[Slot]] = [[(o.place, i) for i in range(len(o.robots))] for o in operations]
-    pairs: list[list[tuple[Slot, Slot]]] = [[] for _ in transitions]
-    gears = []
+Wired = tuple[
+    PetriNet, tuple[Redistribution, ...], tuple[Gear, ...], tuple[tuple[RobotId, ...], ...]
+]
+"""A net with its redistribution functions, its gears, and the slots of its places."""
+
+
+def _wired(robots: Sequence[Robot], operations: Sequence[Operation]) -> Wired:
+    """What `gear_net` is made of: nothing else of its wiring is kept."""
+    wiring = _Wiring(operations)
     for robot in robots:
-        gear_places, gear_events, alone = [], [], (robot.index,)
-        roles = [operations[n].robots.index(robot.index) for n in robot.operations]
-        held = [operations[n].before[i] for n, i in zip(robot.operations, roles, strict=True)]
-        several = held.count(NOPART) > 1
-        for step, (number, slot, label) in enumerate(
-            zip(robot.operations, roles, held, strict=True)
-        ):
-            last, operation = robot.operations[step - 1], operations[number]
-            (done,), (begun,) = numbers[end_of(last)], numbers[operation.start]
-            is_one_of = several and label == NOPART
-            stays = label != NOPART and operation.after[slot] != NOPART
-            wait = PlaceId(len(places))
-            places.append(
-                Place(
-                    f"{robot.name}:{label}" + (f"/{operation.label}" if is_one_of else ""),
-                    numbers[done],
-                    numbers[begun],
-                    "hold" if stays else "wait",
-                    label,
-                    1,
-                    operation.position,
-                )
-            )
-            slots.append(alone)
-            waiting = (wait, 0)
-            pairs[begun].append((waiting, acting[number][slot]))
-            pairs[done].append((acting[last][roles[step - 1]], waiting))
-            gear_places += [wait, operation.place]
-            gear_events += [done, begun]
-        gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
-    net, redistribution = PetriNet(transitions, tuple(places)), [tuple(sorted(p)) for p in pairs]
-    return net, tuple(redistribution), tuple(gears), tuple(slots)
+        wiring.add(robot)
+    net = PetriNet(wiring.transitions, tuple(wiring.places))
+    return net, wiring.redistribution(), tuple(wiring.gears), tuple(wiring.slots)
+
+
+class _Wiring:
+    """The net of `gear_net` so far: `places` with their `slots`, and `gears`. For each operation:
+    the slots of its place (`acting`), what is moved there at its start, robot by robot (`begun`),
+    and where what is there is moved to at its end (`ended`)."""
+
+    def __init__(self, operations: Sequence[Operation]) -> None:
+        self.operations = operations
+        self.transitions = tuple(
+            [Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")]
+        )
+        numbers = [(TransitionId(event),) for event in range(len(self.transitions))]
+        self.starts, self.ends = numbers[::2], numbers[1::2]  # each made once
+        self.places = [*map(self._place, operations, self.starts, self.ends)]
+        self.slots = [o.robots for o in operations]
+        self.acting = [[(o.place, i) for i in range(len(o.robots))] for o in operations]
+        self.begun: list[list[tuple[Slot, Slot]]] = [[] for _ in operations]
+        self.ended = [[*slots] for slots in self.acting]
+        self.gears: list[Gear] = []
+
+    @staticmethod
+    def _place(o: Operation, start: Events, end: Events) -> Place:
+        """The place of an operation."""
+        label = "" if o.after[o.template.carrier - 1] == NOPART else o.label
+        return Place(o.label, start, end, o.template.name, label, len(o.robots), o.position)
+
+    def add(self, robot: Robot) -> None:
+        """Add the gear of a robot, with a wait before each of its operations."""
+        program = [self.operations[number] for number in robot.operations]
+        roles = [o.robots.index(robot.index) for o in program]
+        held = [o.before[role] for o, role in zip(program, roles, strict=True)]
+        several, alone = held.count(NOPART) > 1, (robot.index,)
+        last, left = program[-1], roles[-1]
+        places, events = list[PlaceId](), list[TransitionId]()
+        for o, role, label in zip(program, roles, held, strict=True):
+            done, start, acting = self.ends[last.index], self.starts[o.index], self.acting[o.index]
+            mode = "hold" if label != NOPART != o.after[role] else "wait"
+            name = f"{robot.name}:{label}"
+            if several and label == NOPART:
+                name += f"/{o.label}"
+            wait = PlaceId(len(self.places))
+            self.places.append(Place(name, done, start, mode, label, 1, o.position))
+            self.slots.append(alone)
+            waiting = wait, 0
+            self.begun[o.index].append((waiting, acting[role]))
+            self.ended[last.index][left] = waiting
+            places += wait, acting[role][0]
+            events += done + start
+            last, left = o, role
+        self.gears.append(Gear(robot.name, robot.type, tuple(places), tuple(events)))
+
+    def redistribution(self) -> tuple[Redistribution, ...]:
+        """d_e of each event, once all robots are added."""
+        ended = map(zip, self.acting, self.ended)
+        both = zip(self.begun, ended, strict=True)
+        return tuple([tuple(pairs) for events in both for pairs in events])
 
 
 def beside(pag: PAG, factories: Sequence[Factory]) -> Factory:

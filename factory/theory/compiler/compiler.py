@@ -194,7 +194,7 @@ class _Draft:
         """The instance of a node's template, with its new robots."""
         template, approach = node.template, self.approaches.get(node.label)
         taken = dict(zip(template.inputs, node.inputs, strict=True))
-        before = tuple(taken.get(variable, NOPART) for variable in template.before)
+        before = tuple([taken.get(variable, NOPART) for variable in template.before])
         self._claim_carrier(node, carrier)
         return Operation(
             OperationId(len(self.operations)),
@@ -202,7 +202,7 @@ class _Draft:
             template,
             self._allocate(node, carrier, before, approach.lowered if approach else ""),
             before,
-            tuple(NOPART if label == NOPART else node.label for label in template.after),
+            tuple([NOPART if label == NOPART else node.label for label in template.after]),
             node.dwell,
             node.position,
             approach,
@@ -227,8 +227,8 @@ class _Draft:
     ) -> tuple[RobotId, ...]:
         """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last.
         The one that brings `lowered` is a lift."""
-        template = node.template
-        robots = {template.carrier - 1: carrier}
+        template, holder = node.template, node.template.carrier - 1
+        robots = [carrier] * len(template.robots)
 
         def order(slot: int) -> tuple[int, int, int]:
             label = before[slot]
@@ -236,12 +236,13 @@ class _Draft:
                 return 1, 0, slot
             return 0, self.nodes[label].size, node.inputs.index(label)
 
-        for slot in sorted({*range(len(template.robots))} - {*robots}, key=order):
+        new = [slot for slot in range(len(robots)) if slot != holder]
+        for slot in sorted(new, key=order) if new[1:] else new:
             wanted = template.robots[slot]
             if lowered and before[slot] == lowered:
                 wanted = self._lift(wanted, node)
             robots[slot] = self._new_robot(wanted, node.position)
-        return tuple(robots[slot] for slot in range(len(template.robots)))
+        return tuple(robots)
 
     def _lift(self, wanted: str, node: Node) -> str:
         """The type of a robot that fills the role of a `wanted` and lowers what it brings."""

@@ -125,10 +125,8 @@ def nodes_of(factory: Factory) -> dict[str, Node]:
     for number in sorted(range(len(factory.making)), key=factory.postorder.__getitem__):
         o = factory.operations[number]
         if o.turn == 0:
-            taken = dict(zip(o.template.before, o.before, strict=True))
-            inputs = tuple(taken[x] for x in o.template.inputs)
-            size = 1 + sum(nodes[x].size for x in inputs)
-            nodes[o.label] = Node(o.label, o.template, inputs, o.dwell, size, o.position)
+            size = 1 + sum(nodes[x].size for x in o.inputs)
+            nodes[o.label] = Node(o.label, o.template, o.taken, o.dwell, size, o.position)
     return _in_postorder(nodes, factory.products[0])
 
 

@@ -59,8 +59,10 @@ def _hands_over(operation: Operation) -> bool:
 def _not_lowered(robots: Sequence[Robot], operations: Sequence[Operation]) -> Iterator[Diagnostic]:
     """Operations to which a fixed robot brings what slides, or is blocked."""
     for o in operations:
+        if o.approach is None:
+            continue
         for robot, label in zip(o.robots, o.before, strict=True):
-            if robots[robot].travels or label == NOPART or o.approach is None:
+            if label == NOPART or robots[robot].travels:
                 continue
             if label != o.approach.lowered:
                 message = f"'{label}' cannot be lowered in '{o.label}', as {o.template.name} does"

@@ -50,6 +50,8 @@ from factory.theory.lang.statements import (
 
 _SIGN_OR_WORD = re.compile(r"[\n=(),;]|[^\s=(),;]+")
 _WORD = re.compile(r"[\n;]|[^\s=(),;]+")
+"""What is looked at in definitions without values: words, and where a line or one of them ends."""
+
 _SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA", ";": "SEMICOLON"}
 
 
@@ -74,13 +76,7 @@ class _Builder(Transformer[Token, Any]):
         return Definition(label, operation, arguments, places)
 
     def definitions(self, run: Token, places: PlaceList | None = None) -> list[Definition]:
-        pieces: list[list[Token]] = [[]]
-        for token in _apart(run, _WORD):
-            if token == ";":
-                pieces.append([])
-            else:
-                pieces[-1].append(token)
-        made = [Definition(label, operation, words) for label, operation, *words in pieces]
+        made = [Definition(label, operation, words) for label, operation, *words in _words_of(run)]
         made[-1] = made[-1]._replace(places=places)
         return made
 
@@ -115,11 +111,27 @@ def _lex(text: str) -> list[Token]:
     return tokens
 
 
-def _apart(whole: Token, signs: re.Pattern[str] = _SIGN_OR_WORD) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )`, or of definitions, which are one token of the lexer: all signs
-    and words, or only its words and semicolons."""
+def _words_of(run: Token) -> Iterator[list[Token]]:
+    """The words of each of several definitions, which are one token of the lexer."""
+    start, line, left = run.start_pos or 0, run.line or 1, -(run.column or 1)
+    words = list[Token]()
+    for match in _WORD.finditer(run):
+        text = match[0]
+        if text == ";":
+            yield words
+            words = []
+        elif text == "\n":
+            line, left = line + 1, match.start()
+        else:
+            begin, end = match.span()
+            words.append(Token("WORD", text, start + begin, line, begin - left, line, end - left))
+    yield words
+
+
+def _apart(whole: Token) -> Iterator[Token]:
+    """The tokens of `= ( 0, 0, 1 )`, or of definitions, which are one token of the lexer."""
     start, line, left = whole.start_pos or 0, whole.line or 1, -(whole.column or 1)
-    for match in signs.finditer(whole):
+    for match in _SIGN_OR_WORD.finditer(whole):
         text, (begin, end) = match[0], match.span()
         if text == "\n":
             line, left = line + 1, end - 1

@@ -36,13 +36,15 @@ class ThreadedNet:
 
     def __post_init__(self) -> None:
         sizes = [place.size for place in self.net.places]
-        preset, postset = self.net.preset, self.net.postset
-        for event, pairs in enumerate(self.redistribution):
+        sides = self.net.preset, self.net.postset
+        for event, (pairs, pre, post) in enumerate(zip(self.redistribution, *sides, strict=True)):
             before = [slot for slot, _ in pairs]
             after = [slot for _, slot in pairs]
-            wanted = [(p, i) for p in preset[event] for i in range(sizes[p])]
-            reached = [(q, i) for q in postset[event] for i in range(sizes[q])]
-            if sorted(before) != wanted or sorted(after) != reached:
+            before.sort()
+            after.sort()
+            if before != [(p, i) for p in pre for i in range(sizes[p])] or after != [
+                (q, i) for q in post for i in range(sizes[q])
+            ]:
                 name = self.net.transitions[event].name
                 raise ValueError(f"the redistribution function of {name} is not a bijection")
 

@@ -64,6 +64,12 @@ class Operation:
         return tuple(label for label in self.before if label != NOPART)
 
     @property
+    def taken(self) -> tuple[str, ...]:
+        """The labels brought, in the order of the template's inputs."""
+        brought = dict(zip(self.template.before, self.before, strict=True))
+        return tuple([brought[variable] for variable in self.template.inputs])
+
+    @property
     def pile(self) -> str:
         """The label that the carrier holds before, NOPART for none."""
         return self.before[self.template.carrier - 1]
