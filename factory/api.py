@@ -43,22 +43,18 @@ if TYPE_CHECKING:
     from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
-    from factory.floor.layout.branches import carriers as carriers
+    from factory.floor.layout.bending import Detour as Detour
     from factory.floor.layout.certificate import Certificate as Certificate
-    from factory.floor.layout.clearance import certify as certify
     from factory.floor.layout.dimensions import Clearance as Clearance
     from factory.floor.layout.durations import Pace as Pace
-    from factory.floor.layout.embedding import certified as certified
-    from factory.floor.layout.exclusions import coordinated as coordinated
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.hands.choosing import Hands as Hands
     from factory.floor.layout.hands.hand import Hand as Hand
     from factory.floor.layout.layout import Layout as Layout
+    from factory.floor.layout.layout_machines import LayoutMachines as LayoutMachines
+    from factory.floor.layout.layout_search import LayoutSearch as LayoutSearch
     from factory.floor.layout.request import Ground as Ground
     from factory.floor.layout.saved import LayoutTable as LayoutTable
-    from factory.floor.layout.shapes import payload_boxes as payload_boxes
-    from factory.floor.layout.starting import start_positions as start_positions
-    from factory.floor.layout.sweeps import regions as regions
     from factory.floor.mating.finder import Finder as Finder
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
@@ -82,20 +78,20 @@ if TYPE_CHECKING:
     from factory.theory.lang.template_reader import read_template as read_template
     from factory.theory.lang.writer import write_pag as write_pag
     from factory.theory.lang.writer import write_template as write_template
+    from factory.theory.nets.coordinated import Order as Order
+    from factory.theory.nets.coordinated import Past as Past
     from factory.theory.nets.gears import Gear as Gear
     from factory.theory.nets.gears import GearNet as GearNet
-    from factory.theory.nets.marked import NONE as NONE
     from factory.theory.nets.marked import MarkedNet as MarkedNet
-    from factory.theory.nets.marked import marked as marked
-    from factory.theory.nets.marked import token_free as token_free
     from factory.theory.nets.petri import Marking as Marking
     from factory.theory.nets.petri import PetriNet as PetriNet
     from factory.theory.nets.petri import Place as Place
     from factory.theory.nets.petri import Transition as Transition
     from factory.theory.nets.undone import Entry as Entry
     from factory.theory.nets.undone import Undone as Undone
+    from factory.theory.nets.verdict import Defect as Defect
     from factory.theory.nets.verdict import Verdict as Verdict
-    from factory.theory.nets.verdict import listing as listing
+    from factory.theory.nets.verify import GearProof as GearProof
     from factory.theory.nets.verify import proved as proved
     from factory.theory.nets.verify import verify as verify
     from factory.theory.plant.demand import Demand as Demand
@@ -125,11 +121,12 @@ HOMES = {
     "theory.lang.writer": "write_pag write_template",
     "theory.lang.template_reader": "all_templates read_template",
     "theory.nets.gears": "Gear GearNet",
-    "theory.nets.marked": "MarkedNet NONE marked token_free",
+    "theory.nets.marked": "MarkedNet",
     "theory.nets.petri": "Marking PetriNet Place Transition",
     "theory.nets.undone": "Entry Undone",
-    "theory.nets.verdict": "Verdict listing",
-    "theory.nets.verify": "proved verify",
+    "theory.nets.verdict": "Verdict Defect",
+    "theory.nets.verify": "proved verify GearProof",
+    "theory.nets.coordinated": "Past Order",
     "theory.control.laws": "Setting navigation",
     "theory.control.mode": "Limits Mode",
     "theory.plant.demand": "Demand",
@@ -143,21 +140,17 @@ HOMES = {
     "floor.robots.catalogue": "load_catalogue",
     "floor.mating.finder": "Finder",
     "floor.layout.certificate": "Certificate",
-    "floor.layout.clearance": "certify",
     "floor.layout.durations": "Pace",
-    "floor.layout.embedding": "certified",
     "floor.layout.guidepath": "Guidepath",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
     "floor.layout.layout": "Layout",
     "floor.layout.request": "Ground",
-    "floor.layout.shapes": "payload_boxes",
     "floor.layout.dimensions": "Clearance",
-    "floor.layout.exclusions": "coordinated",
     "floor.layout.saved": "LayoutTable",
-    "floor.layout.starting": "start_positions",
-    "floor.layout.sweeps": "regions",
-    "floor.layout.branches": "carriers",
+    "floor.layout.layout_machines": "LayoutMachines",
+    "floor.layout.layout_search": "LayoutSearch",
+    "floor.layout.bending": "Detour",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.parts": "HIDDEN",

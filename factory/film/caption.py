@@ -18,8 +18,7 @@ from factory.support.pictures.ink import (
     fitted,
     width,
 )
-from factory.support.texts import counted
-from factory.theory.nets.verdict import listing
+from factory.support.texts import counted, listing
 
 BAR = 0.82
 """Opacity of the bars that words stand on."""

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
+from factory.api import MarkedNet, PetriNet, Place, Timing, steady_from
 from factory.apps.analyze.firing import Slack, circuits
 from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Change
@@ -156,8 +156,8 @@ def _gears(
         for step, number in enumerate(robot.operations):
             way = ways.get((robot.index, number), number)
             if way != number and seconds[way] > seconds[gear.waiting(step)] + seconds[number]:
-                slowest[2 * step], slowest[2 * step + 1] = way, NONE
-        places = tuple(p for p in slowest if p != NONE)
+                slowest[2 * step], slowest[2 * step + 1] = way, MarkedNet.NONE
+        places = tuple(p for p in slowest if p != MarkedNet.NONE)
         gears.append(_circuit(gear.robot, places, seconds, tokens, timing.factory.period))
     return gears
 

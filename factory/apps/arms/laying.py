@@ -20,9 +20,10 @@ from factory.api import (
     Guidepath,
     Hand,
     Layout,
+    LayoutMachines,
+    LayoutSearch,
     Product,
     RunError,
-    payload_boxes,
 )
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import with_tool
@@ -50,8 +51,6 @@ from factory.floor.layout.certificate import (
     Region,
 )
 from factory.floor.layout.dimensions import PAYLOADS
-from factory.floor.layout.hands.leaving import homes
-from factory.floor.layout.visits import Visit, visits_of
 
 ASIDE = 0.0, 1.2, 1.8
 """Angles that are tried as `Arrangement.aside` [rad]."""
@@ -145,7 +144,7 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     private = private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
     layout = _layout(cell, tours, chains)
-    alone = homes(layout)
+    alone = LayoutMachines(layout).homes
     asked = [*orders_of(cell, tours, private), *orders_at_sources(cell, tours, alone)]
     apart = exclusions_of(layout, asked, tours, alone)
     return replace(layout, certificate=_certificate(cell, layout, apart))
@@ -250,7 +249,8 @@ def _layout(
         for o in factory.operations
     ]
     robots = range(len(factory.robots))
-    visits = visits_of(factory, [paths[n] for n in robots], stations)
+    search = LayoutSearch(factory, cell.product)
+    visits = search.visits([paths[n] for n in robots], stations)
     for label, burden in cell.burdens.items():
         key = factory.by_label[label].index, cell.arm_of[label]
         at = arm.middle(visits[key].at)
@@ -260,7 +260,7 @@ def _layout(
         else:
             place, elevation = cell.lines[burden.source].stand(burden.takes), 0.0
         shift = place[0] - at[0], place[1] - at[1]
-        visits[key] = Visit(visits[key].at, 0.0, 0.0, elevation, shift)
+        visits[key] = replace(visits[key], lift=0.0, up=0.0, elevation=elevation, shift=shift)
     for t in every:
         key = cell.burdens[t.label].join.index, cell.arm_of[t.label]
         visits[key] = replace(visits[key], at=t.stop, shift=(t.stop - REACH, 0.0))
@@ -271,7 +271,7 @@ def _layout(
         guidepaths=tuple(paths[n] for n in robots),
         visits=visits,
         hands=tuple(hands.get(n) for n in robots),
-        payloads=payload_boxes(factory, cell.product),
+        payloads=search.payloads,
         floor=floor_of(cell),
         certificate=None,
         plain=None,

@@ -8,13 +8,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from factory.api import Diagnostic, Layout, Operation, RunError
+from factory.api import Diagnostic, Layout, LayoutMachines, Operation, Past, RunError
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.planning import ArmPlanner, ArmTour
 from factory.apps.arms.sharing import SweptArm, clear_share
 from factory.floor.layout.certificate import Exclusions, Precedence
-from factory.floor.layout.coordinating import with_machines
-from factory.theory.nets.coordinated import Past
 from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
 BEYOND = 0.001
@@ -137,7 +135,7 @@ def exclusions_of(
     for arm, each in tours.items():
         backs[arm] = round(min(t.begins + t.goes.hover for t in each), 6)
     passes = tuple(dict.fromkeys(away.past for away in asked))
-    net, operations = with_machines(layout, passes), layout.factory.operations
+    net, operations = LayoutMachines(layout).coordinated_with(passes), layout.factory.operations
     event = {past: net.net.right[place] for past, (place, _) in net.passes.items()}
     called = [transition.name for transition in net.net.net.transitions]
     orders = tuple(
@@ -149,7 +147,7 @@ def exclusions_of(
         )
         for away in asked
     )
-    if with_machines(layout, passes, orders).deadlock:
+    if LayoutMachines(layout).coordinated_with(passes, orders).deadlock:
         message = "the arms wait for each other for ever"
         raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
     return Exclusions(passes=passes, orders=orders, backs=tuple(backs.items()))

@@ -9,12 +9,11 @@ from pathlib import Path
 
 from factory.api import (
     Certificate,
+    LayoutMachines,
     Model,
     Project,
     RunError,
     Verdict,
-    certify,
-    coordinated,
     physical_model,
 )
 from factory.apps.drawing.tables import titled
@@ -62,7 +61,9 @@ DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
     "clearance.json": lambda what: _json(what.clearance.as_json()),
     "dot": lambda what: write_dot(what.project.layout.factory.net),
     "pnml": lambda what: write_pnml(what.project.layout.factory.net),
-    "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "coordinated.pnml": lambda what: write_pnml(
+        LayoutMachines(what.project.layout).coordinated.net
+    ),
     "goals.json": lambda what: _json(goals(what.model)),
     "ways.json": lambda what: _json(ways(what.model)),
 }
@@ -132,7 +133,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     request.claim(project.name)
     layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
-    clearance = layout.certificate or certify(layout)
+    clearance = layout.certificate or LayoutMachines(layout).certify()
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
     model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, marked
+from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project
 from factory.apps.drawing.canvas import LETTER, Canvas, Point, hexadecimal, shortened
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import COLOURS, LEFT, SHARED, apart, swimlanes
@@ -156,7 +156,7 @@ def export(subject: Subject) -> str:
     """The net or the assembly tree as a drawing."""
     if view_of(subject) == "tree":
         return draw_tree(pag_of(subject))
-    return draw_net(marked(subject.net), subject.stem)
+    return draw_net(MarkedNet.of(subject.net), subject.stem)
 
 
 def draw_net(net: MarkedNet, title: str) -> str:

@@ -12,7 +12,7 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Catalogue, Factory, Finder, Node, Pace, Plan, Product, marked
+from factory.api import Catalogue, Factory, Finder, MarkedNet, Node, Pace, Plan, Product
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
 from factory.floor.mating.findings import Level
@@ -56,7 +56,7 @@ class Shift:
             return max(self.work) / self.timing.factory.period
         made = folded(self.timing.factory, lines, self.catalogue)
         delays = estimated_delays(replace(self.timing, factory=made))
-        net = marked(made.net)
+        net = MarkedNet.of(made.net)
         idle = [0.0] * (len(net.tokens) - len(delays))
         return max_cycle_ratio(net, [*delays, *idle]).seconds / made.period
 

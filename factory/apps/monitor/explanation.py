@@ -12,7 +12,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.api import MonitorSubject, marked, token_free
+from factory.api import MarkedNet, MonitorSubject
 from factory.engine.record.findings import Firing, Violation
 from factory.engine.timing.pool import with_wip
 
@@ -64,7 +64,7 @@ class _Solver:
         self.observed, self.begin, self.end = observed, begin, end
         subject = observed.subject
         factory, wip, counts = subject.factory, subject.wip, subject.counts
-        self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
+        self.net = MarkedNet.of(factory.net) if wip is None else with_wip(factory, wip)
         self.names = [t.name for t in factory.net.threaded.transitions]
         self.dwell = {
             int(o.place): max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
@@ -105,7 +105,7 @@ class _Solver:
 
     def _order(self) -> list[tuple[int, int]]:
         """All firings, each after its preconditions."""
-        order = token_free(self.net).order
+        order = self.net.token_free.order
         first, last = min(self.done), max(self.count)
         return [
             (event, unit)

@@ -13,13 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, Solid, listing
+from factory.api import Diagnostic, InputError, Solid
 from factory.apps.planning.parts import PlacedPart
 from factory.floor.geometry.overlap import Common, drawn, overlap_of
 from factory.floor.geometry.overlapping import near_pairs
 from factory.floor.geometry.touching_groups import groups_of
 from factory.support.arrays import Array
 from factory.support.meshes.bodies import connected
+from factory.support.texts import listing
 
 LARGER = 50.0
 """A part that is more than this many times larger than the largest other part, or smaller than the

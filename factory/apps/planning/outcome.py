@@ -6,13 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from factory.api import Diagnostic, InputError, Template, listing
+from factory.api import Diagnostic, InputError, Template
 from factory.apps.planning.cannot import Interlock, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import CannotAssemble, Planned
 from factory.apps.planning.posing import in_words
 from factory.apps.planning.writing import planned_product
 from factory.support.files import head_of, own_names, write_all
+from factory.support.texts import listing
 from factory.support.user_defaults import NAME
 
 HEAD = b"# written by `factory plan`: equal screws are brought by one robot, and driven in by one\n"

@@ -11,11 +11,12 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid, listing
+from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid
 from factory.floor.geometry.overlap import drawn
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
 from factory.support.meshes.triangles import is_closed
+from factory.support.texts import listing
 from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"

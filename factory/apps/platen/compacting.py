@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from factory.api import Layout, Pace
+from factory.api import Detour, Layout, LayoutMachines, Pace
 from factory.apps.platen.placing import Floor, Placing
-from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.branches import branch_of
-from factory.floor.layout.feeding import cleared
 from factory.floor.layout.presence import ROUNDING
 from factory.floor.layout.way import Bend, rounding_for
 from factory.support.decimals import up
@@ -70,8 +68,8 @@ class Reach:
         tail = max((path.length - at[o.index] for o in gear if o.carrier == robot), default=0.0)
         aside = [0.0, 0.0] if tail < ROUNDING else []
         if layout.magazine(robot):
-            tail = max(tail, cleared(layout, robot, 0.0))
-            aside = [cleared(layout, robot, side) for side in (1.0, -1.0)] if aside else []
+            cleared = partial(LayoutMachines(layout).cleared, robot)
+            tail, aside = max(tail, cleared(0.0)), [*map(cleared, (1.0, -1.0))] if aside else []
         return cls(max(heads), tail, tuple(aside))
 
 
@@ -95,8 +93,7 @@ class _Search:
         self.rng = np.random.default_rng(seed)
         goes = [r for r, path in enumerate(layout.guidepaths) if r and path.travels]
         self.reach = {robot: Reach.of(layout, robot) for robot in goes}
-        on = self.ground.on
-        self.under = [branch_of(on, robot) for robot in range(len(on))]
+        self.under = [*map(self.ground.search.branch, range(len(self.ground.on)))]
         self.begin = Placing(self.ground, {})
         low, high, lowest, highest = self.begin.hulls[0]
         self.middle = np.array([(low + high) / 2, (lowest + highest) / 2])
@@ -118,7 +115,7 @@ class _Search:
             there.look(under)
             if self.worth(there, size) + press * there.deep.sum() > limit:
                 continue
-            made = bent(self.layout, there.detours)
+            made = self.ground.bent(there.detours)
             if self.pace.cycle_of(made) > self.most:
                 continue
             here = there

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout, carriers
+from factory.api import Factory, Hand, Layout, LayoutSearch
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.kinds import BELOW
@@ -41,7 +41,7 @@ def hands_in_line(
     cut = {robot for pieces in lines.values() for robot in pieces}
     settled = [None if robot in cut else before.hand(old) for robot, old in enumerate(origins)]
     choice = _Choice(before, HoldingInLanes(before, factory, origins, cut, relays), settled)
-    on, turned = carriers(before.factory), set[int]()
+    on, turned = LayoutSearch(before.factory, before.product).carriers, set[int]()
     for old in sorted(lines, key=lambda robot: _depth(on, robot)):
         if choice.settle(old, on[old], lines[old]) < 0:
             turned.add(old)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Clearance, Factory, Hand, Layout, Operation
+from factory.api import Factory, Hand, Layout, LayoutSearch, Operation
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
@@ -57,7 +57,8 @@ class HoldingInLanes(Holding):
         relays: Collection[int],
     ) -> None:
         super().__init__(factory, before.product)
-        self.relays, self.clearance = relays, Clearance(before.clearance, before.factory.carriage)
+        self.relays = relays
+        self.clearance = LayoutSearch(before.factory, before.product, before.clearance).size
         self.origins, self.cut = origins, cut
         self.headings = [before.guidepaths[old].heading for old in origins]
         for robot in cut:

@@ -331,7 +331,7 @@ class Simulation:
         """Names the order that has not been placed, the robots that are in an operation, or else
         those that wait for one that cannot start."""
         factory, supervisor = self.supervisor.factory, self.supervisor
-        numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
+        numbers = supervisor.under_way or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
         pairs = ((factory.robots[r].name, o) for o in places for r in o.robots)
         robots = ", ".join(f"{name} in {o.template.name}({o.label})" for name, o in pairs)

@@ -18,8 +18,13 @@ from factory.support.boxes import Point2
 
 @dataclass(frozen=True, slots=True)
 class Detour:
-    """How the guidepath of a robot is bent: its new `travel`, its `bends`, and their `rounding`
-    [m]."""
+    """How the guidepath of a robot is bent.
+
+    Attributes:
+        travel: its new travel [m].
+        bends: where it bends; nothing where it is straight.
+        rounding: of its bends [m].
+    """
 
     travel: float
     bends: tuple[Bend, ...] = ()

@@ -56,6 +56,11 @@ class Region:
         return self.kind == PAYLOAD_BODY
 
     @property
+    def stands(self) -> bool:
+        """Whether it is of a station."""
+        return self.kind in STATIONS
+
+    @property
     def is_coupled(self) -> bool:
         """Whether its robot is there in the mode of one operation only."""
         return self.mode != ALWAYS

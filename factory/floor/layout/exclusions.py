@@ -30,11 +30,11 @@ from factory.floor.layout.machines import presences
 from factory.floor.layout.nearness import Near, near
 from factory.floor.layout.presence import Presence
 from factory.floor.layout.staying import carried_ahead
+from factory.support.texts import listing
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, overlap, times
 from factory.theory.nets.marked import MarkedNet
-from factory.theory.nets.verdict import listing
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import end_of, operation_of, start_of
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from factory.api import Diagnostic, Factory, InputError, Layout, Settings, coordinated
+from factory.api import Diagnostic, Factory, InputError, Layout, LayoutMachines, Settings
 from factory.apps.exports.iec import declarations as iec
 from factory.apps.exports.iec.robots import COMPLETED, RobotBlocks
 from factory.apps.exports.subject import Subject
@@ -61,7 +61,7 @@ def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> iec
         layout,
         modes,
         stages_of(layout, modes, settings),
-        coordinated(layout).orders,
+        LayoutMachines(layout).coordinated.orders,
         stations(factory),
     )
     units = [blocks.block(robot.index) for robot in factory.robots]

@@ -13,11 +13,9 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 
-from factory.api import NOPART, Layout, Mode
+from factory.api import NOPART, Layout, Mode, Order
 from factory.apps.exports.iec.declarations import OrganizationUnit, Variable, comment
 from factory.floor.modes.staging import HeadStart
-from factory.theory.control.mode import STILL
-from factory.theory.nets.coordinated import Order
 from factory.theory.plant.programs import Program, ProgramStep
 
 WAIT, RUN, GRIP, LEAVE = range(4)
@@ -227,7 +225,7 @@ class RobotBlocks:
         yield "        Reached := TRUE;"
         for slot, axis in enumerate(self.layout.factory.moves[number]):
             there = _at(axis, float(mode.goals[slot]), mode.eps)
-            still = f"ABS(Axes[{axis + 1}].Speed) < {_real(STILL)}"
+            still = f"ABS(Axes[{axis + 1}].Speed) < {_real(Mode.STILL)}"
             yield f"        Reached := Reached AND {there} AND {still};"
 
 
