@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from factory.engine.mjcf.parts import HIDDEN as HIDDEN
     from factory.engine.mjcf.replica import Geoms as Geoms
     from factory.engine.mjcf.replica import Replica as Replica
+    from factory.engine.mjcf.weld_frames import WeldFrames as WeldFrames
     from factory.engine.record.ending import CutOff as CutOff
     from factory.engine.record.failures import Failing as Failing
     from factory.engine.record.failures import Failures as Failures
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from factory.engine.simulation.run import steady_from as steady_from
     from factory.engine.simulation.simulation import Simulation as Simulation
     from factory.engine.simulation.world import World as World
+    from factory.engine.timing.demand import Demand as Demand
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
     from factory.film.picture import Picture as Picture
@@ -94,7 +96,6 @@ if TYPE_CHECKING:
     from factory.theory.nets.verify import GearProof as GearProof
     from factory.theory.nets.verify import proved as proved
     from factory.theory.nets.verify import verify as verify
-    from factory.theory.plant.demand import Demand as Demand
     from factory.theory.plant.factory import Factory as Factory
     from factory.theory.plant.operation import Operation as Operation
     from factory.theory.plant.robot import Robot as Robot
@@ -129,7 +130,7 @@ HOMES = {
     "theory.nets.coordinated": "Past Order",
     "theory.control.laws": "Setting navigation",
     "theory.control.mode": "Limits Mode",
-    "theory.plant.demand": "Demand",
+    "engine.timing.demand": "Demand",
     "theory.plant.factory": "Factory",
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
@@ -156,6 +157,7 @@ HOMES = {
     "engine.mjcf.parts": "HIDDEN",
     "engine.mjcf.replica": "Geoms Replica",
     "engine.mjcf.loading": "load",
+    "engine.mjcf.weld_frames": "WeldFrames",
     "engine.timing.timed": "pace",
     "engine.timing.timing": "Timing",
     "engine.record.ending": "CutOff",

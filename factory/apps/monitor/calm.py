@@ -69,7 +69,7 @@ def _judged(
     offset = units.more(here, begin)
     if subject.word is not None:
         here = replace(here, word=subject.word.later(offset))
-    monitor = Monitor(here, Anatomy.of(m, subject.factory, subject.bent), next(inside))
+    monitor = Monitor(here, Anatomy.of(m, subject), next(inside))
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
     for observation in inside:
         monitor.see(observation)

@@ -19,6 +19,7 @@ from factory.api import (
     Observation,
     Report,
     RunVerdict,
+    WeldFrames,
 )
 from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, project_of, settings_of
@@ -28,12 +29,11 @@ from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.calm import judge_calm
 from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
-from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
 from factory.engine.record.subject import MonitorTable
+from factory.engine.timing.demand import Word
 from factory.support.tables import value_of
 from factory.theory.nets.replay import replay
-from factory.theory.plant.demand import Word
 
 JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
@@ -68,7 +68,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     """The report of a monitor on the states of a log, and on its firings and figures."""
-    seen, anatomy = observations(log), Anatomy.of(m, subject.factory, subject.bent)
+    seen, anatomy = observations(log), Anatomy.of(m, subject)
     monitor = Monitor(subject, anatomy, next(seen))
     for observation in seen:
         monitor.see(observation)
@@ -81,7 +81,7 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
 def jumps(log: Log, m: Any) -> Iterator[Violation]:
     """The first tick in which the displacement of each slide joint is inconsistent with its speeds
     at both ends of the tick."""
-    slides, reported = np.flatnonzero(m.jnt_type == SLIDE), set[int]()
+    slides, reported = np.flatnonzero(m.jnt_type == WeldFrames.SLIDE), set[int]()
     at, moves = m.jnt_qposadr[slides], m.jnt_dofadr[slides]
     for first in range(0, len(log) - 1, SPAN):
         rows = range(first, min(first + SPAN + 1, len(log)))

@@ -26,8 +26,7 @@ from factory.apps.deviations.injector import FaultInjector, Hit
 from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.responding import RecoveryPolicy
-from factory.apps.recovery.standing import patience
-from factory.engine.record.failures import Stood
+from factory.apps.recovery.standing import Stood, patience
 from factory.engine.simulation.supervisor import Supervisor
 from factory.support.tables import table_of
 from factory.theory.problem.template import Failure

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.api import Limits, Mode, Operation, Simulation
-from factory.engine.record.failures import Stood
 from factory.engine.simulation.supervisor import Supervisor
 from factory.theory.control.navigation import Bundle
 
@@ -24,6 +23,10 @@ MOVES = 5e-3
 def patience(seconds: float) -> float:
     """The time [s] after which something is late that should take so many `seconds`."""
     return SLUGGISH * seconds + GRACE
+
+
+Stood = tuple[float, tuple[str, ...]]
+"""A time [s], and the names of the robots that stand from then on."""
 
 
 class MotionHold:

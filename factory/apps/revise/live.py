@@ -11,9 +11,9 @@ from typing import Any
 
 from factory.api import Demand, Project, Timing, write_pag
 from factory.apps.revise.family import family
+from factory.engine.timing.demand import Word
 from factory.engine.timing.on_demand import cycle_of
 from factory.floor.layout.resting import on_demand
-from factory.theory.plant.demand import Word
 
 UNITS = 24
 """Number of units of one product from which its cycle time is taken."""

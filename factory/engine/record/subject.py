@@ -9,6 +9,8 @@ from types import MappingProxyType
 from typing import Any
 
 from factory.engine.record.state import Recordable
+from factory.engine.timing.demand import Word
+from factory.engine.timing.pool import with_wip
 from factory.floor.geometry.fused_bodies import FusedBodies, bodies_of
 from factory.floor.layout.chains import Chains, SoughtCurves
 from factory.floor.layout.exclusions import goes_early
@@ -17,8 +19,8 @@ from factory.floor.layout.way import BendRows, BentWay, Ways, kept_in, rows_of
 from factory.support.settings import Settings
 from factory.support.tables import table_of
 from factory.theory.nets.history import firings
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking
-from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 
@@ -119,6 +121,14 @@ class MonitorSubject:
         if self.chains is not None:
             return self.chains.robots, self.chains.sought
         return (*self.ways,), Ways.bent(self.ways.values())
+
+    @property
+    def net(self) -> MarkedNet:
+        """The net with its initial tokens, which also bounds the units inside if they are
+        bounded."""
+        if self.wip is None:
+            return MarkedNet.of(self.factory.net)
+        return with_wip(self.factory, self.wip)
 
     @cached_property
     def counts(self) -> Mapping[int, int]:

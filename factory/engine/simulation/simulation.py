@@ -22,6 +22,7 @@ from factory.engine.simulation.run_supervisor import RunSupervisor
 from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
 from factory.engine.timing.cycle_time import CycleTime
+from factory.engine.timing.demand import Word
 from factory.engine.timing.on_demand import cycle_of
 from factory.engine.timing.timed import Timed, duration
 from factory.engine.timing.timing import Timing
@@ -36,7 +37,6 @@ from factory.theory.control.mode import Limits
 from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.replay import replay
-from factory.theory.plant.demand import Word
 
 if TYPE_CHECKING:
     from factory.engine.mjcf.loading import EngineModel

@@ -18,6 +18,7 @@ from factory.engine.simulation.ahead import Ahead
 from factory.engine.simulation.bundles import Bundles
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.world import World
+from factory.engine.timing.demand import Word
 from factory.engine.timing.distributed import Scan
 from factory.floor.modes.staging import HeadStart
 from factory.support.arrays import Array, Truth
@@ -25,7 +26,6 @@ from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.undone import Undone
-from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import TransitionId

@@ -30,12 +30,12 @@ from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
+from factory.engine.timing.demand import Word
 from factory.support.arrays import Array, Index
 from factory.support.engine import by_name, mujoco
 from factory.support.settings import MOST
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.demand import Word
 from factory.theory.plant.operation import Operation
 
 GIVEN_UP = tuple(
