@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from factory.engine.mjcf import names as names
     from factory.engine.mjcf.loading import load as load
     from factory.engine.mjcf.model import Model as Model
-    from factory.engine.mjcf.parts import HIDDEN as HIDDEN
     from factory.engine.mjcf.replica import Geoms as Geoms
     from factory.engine.mjcf.replica import Replica as Replica
     from factory.engine.mjcf.weld_frames import WeldFrames as WeldFrames
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from factory.engine.simulation.mujoco.world import MujocoWorld as MujocoWorld
     from factory.engine.simulation.request import RunRequest as RunRequest
     from factory.engine.simulation.run import Run as Run
-    from factory.engine.simulation.run import steady_from as steady_from
     from factory.engine.simulation.simulation import Simulation as Simulation
     from factory.engine.simulation.world import World as World
     from factory.engine.timing.demand import Demand as Demand
@@ -41,13 +39,15 @@ if TYPE_CHECKING:
     from factory.engine.timing.timing import Timing as Timing
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
+    from factory.floor.geometry.drawn_solids import DrawnSolids as DrawnSolids
     from factory.floor.geometry.meshes import Mesh as Mesh
     from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
+    from factory.floor.layout import dimensions as dimensions
     from factory.floor.layout.bending import Detour as Detour
     from factory.floor.layout.certificate import Certificate as Certificate
-    from factory.floor.layout.dimensions import Clearance as Clearance
+    from factory.floor.layout.certificate import Region as Region
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.hands.choosing import Hands as Hands
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.request import Ground as Ground
     from factory.floor.layout.saved import LayoutTable as LayoutTable
     from factory.floor.mating.finder import Finder as Finder
+    from factory.floor.mating.findings import Matings as Matings
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
@@ -89,13 +90,13 @@ if TYPE_CHECKING:
     from factory.theory.nets.petri import PetriNet as PetriNet
     from factory.theory.nets.petri import Place as Place
     from factory.theory.nets.petri import Transition as Transition
-    from factory.theory.nets.undone import Entry as Entry
     from factory.theory.nets.undone import Undone as Undone
     from factory.theory.nets.verdict import Defect as Defect
     from factory.theory.nets.verdict import Verdict as Verdict
     from factory.theory.nets.verify import GearProof as GearProof
     from factory.theory.nets.verify import proved as proved
     from factory.theory.nets.verify import verify as verify
+    from factory.theory.plant.approaches import Approach as Approach
     from factory.theory.plant.factory import Factory as Factory
     from factory.theory.plant.operation import Operation as Operation
     from factory.theory.plant.robot import Robot as Robot
@@ -124,7 +125,7 @@ HOMES = {
     "theory.nets.gears": "Gear GearNet",
     "theory.nets.marked": "MarkedNet",
     "theory.nets.petri": "Marking PetriNet Place Transition",
-    "theory.nets.undone": "Entry Undone",
+    "theory.nets.undone": "Undone",
     "theory.nets.verdict": "Verdict Defect",
     "theory.nets.verify": "proved verify GearProof",
     "theory.nets.coordinated": "Past Order",
@@ -134,27 +135,29 @@ HOMES = {
     "theory.plant.factory": "Factory",
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
+    "theory.plant.approaches": "Approach",
     "theory.compiler.expanding": "Node expand",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid",
     "floor.geometry.product": "product_geometry",
+    "floor.geometry.drawn_solids": "DrawnSolids",
     "floor.robots.catalogue": "load_catalogue",
     "floor.mating.finder": "Finder",
-    "floor.layout.certificate": "Certificate",
+    "floor.mating.findings": "Matings",
+    "floor.layout.certificate": "Certificate Region",
     "floor.layout.durations": "Pace",
+    "floor.layout": "dimensions",
     "floor.layout.guidepath": "Guidepath",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
     "floor.layout.layout": "Layout",
     "floor.layout.request": "Ground",
-    "floor.layout.dimensions": "Clearance",
     "floor.layout.saved": "LayoutTable",
     "floor.layout.layout_machines": "LayoutMachines",
     "floor.layout.layout_search": "LayoutSearch",
     "floor.layout.bending": "Detour",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
-    "engine.mjcf.parts": "HIDDEN",
     "engine.mjcf.replica": "Geoms Replica",
     "engine.mjcf.loading": "load",
     "engine.mjcf.weld_frames": "WeldFrames",
@@ -169,7 +172,7 @@ HOMES = {
     "engine.simulation.modelling": "physical_model",
     "engine.simulation.mujoco.world": "MujocoWorld",
     "engine.simulation.request": "RunRequest",
-    "engine.simulation.run": "Run steady_from",
+    "engine.simulation.run": "Run",
     "engine.simulation.simulation": "Simulation",
     "engine.simulation.world": "World",
     "pipeline": "Project",

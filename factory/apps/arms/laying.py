@@ -23,6 +23,7 @@ from factory.api import (
     LayoutMachines,
     LayoutSearch,
     Product,
+    Region,
     RunError,
 )
 from factory.apps.arms.arrangement import Arrangement
@@ -37,20 +38,13 @@ from factory.apps.arms.orders import (
     BEYOND,
     InEachOthersWay,
     PrivateParts,
-    exclusions_of,
     next_tour,
     orders_at_sources,
     orders_of,
     private_parts,
+    with_orders,
 )
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
-from factory.floor.layout.certificate import (
-    ARM_BODY,
-    POST_BODY,
-    Exclusions,
-    Region,
-)
-from factory.floor.layout.dimensions import PAYLOADS
 
 ASIDE = 0.0, 1.2, 1.8
 """Angles that are tried as `Arrangement.aside` [rad]."""
@@ -146,8 +140,8 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     layout = _layout(cell, tours, chains)
     alone = LayoutMachines(layout).homes
     asked = [*orders_of(cell, tours, private), *orders_at_sources(cell, tours, alone)]
-    apart = exclusions_of(layout, asked, tours, alone)
-    return replace(layout, certificate=_certificate(cell, layout, apart))
+    certified = replace(layout, certificate=_certificate(cell, layout))
+    return with_orders(certified, asked, tours, alone)
 
 
 def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimits) -> ArmTour:
@@ -279,8 +273,8 @@ def _layout(
     )
 
 
-def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certificate:
-    """The certificate of a cell."""
+def _certificate(cell: Arrangement, layout: Layout) -> Certificate:
+    """The certificate of a cell, without what keeps its machines apart."""
     rails = cell.rails[0].certificate
     assert rails is not None
     return replace(
@@ -289,7 +283,7 @@ def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certif
         robots=tuple(robot.name for robot in cell.factory.robots),
         operations=tuple(operation.label for operation in cell.factory.operations),
         regions=tuple(_regions(cell, layout)),
-        apart=apart,
+        apart=replace(rails.apart, excluded=(), orders=(), passes=(), backs=(), faults=()),
     )
 
 
@@ -301,9 +295,9 @@ def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     for arm, stand in cell.stands.items():
         (x, y, z), half = stand.place, 0.25 * cell.ring.outer
         box = x - half, x + half, y - half, y + half
-        yield Region(arm, PAYLOADS, ARM_BODY, box, (0.0, z + 0.7 * cell.ring.outer))
+        yield Region(arm, Region.PAYLOADS, Region.ARM, box, (0.0, z + 0.7 * cell.ring.outer))
     for label, well in cell.wells.items():
         arm = cell.arm_of[label]
-        yield Region(arm, PAYLOADS, POST_BODY, well.feeder.housing, (0.0, cell.top), label)
+        yield Region(arm, Region.PAYLOADS, Region.POST, well.feeder.housing, (0.0, cell.top), label)
     shed = layout.shed
-    yield Region(0, PAYLOADS, POST_BODY, shed, (0.0, cell.top))
+    yield Region(0, Region.PAYLOADS, Region.POST, shed, (0.0, cell.top))

@@ -8,11 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Layout, LayoutMachines, Solid
+from factory.api import Layout, LayoutMachines, Solid, dimensions
 from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.floor.layout.tiles import tiles_of
 from factory.support.boxes import Box, Extent, Point2
-from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 JUNCTION = 0.008
 """Radius of the circle at a junction [m]."""
@@ -121,7 +120,7 @@ def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
         sides = sorted((limb.low[1] * path.left, limb.high[1] * path.left))
         box: Extent = (limb.low[0], limb.high[0], sides[0], sides[1])
         yield Flat.of_box("finger", path.world(box, foot))
-    arm: Extent = (0.0, rim, -ARM_WIDTH / 2, ARM_WIDTH / 2)
+    arm: Extent = (0.0, rim, -dimensions.ARM_WIDTH / 2, dimensions.ARM_WIDTH / 2)
     yield Flat.of_box("arm", path.world(arm, foot))
     carriage = Flat.of_box(style, path.world((-half, half, -half, half), foot))
     yield replace(carriage, name=layout.factory.robots[robot].name)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import HIDDEN, Replica, names
+from factory.api import Model, Replica, names
 from factory.engine.mjcf.replica import SHOWN
 from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
@@ -34,7 +34,7 @@ class SolidReplica(Replica):
         pair at least movable, and how deep (n,) one is inside the other [m]."""
         m, d = self.m, self.d
         self.place(qpos)
-        m.body_contype[:] = m.body_conaffinity[:] = self._solid & (d.xpos[:, 2] > HIDDEN)
+        m.body_contype[:] = m.body_conaffinity[:] = self._solid & (d.xpos[:, 2] > Model.HIDDEN)
         mujoco.mj_collision(m, d)
         return d.contact.geom[: d.ncon], -d.contact.dist[: d.ncon]
 

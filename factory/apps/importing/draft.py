@@ -10,8 +10,7 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Parameter, Product
-from factory.floor.geometry.overlapping import overlaps_of
+from factory.api import PAG, Assembly, Diagnostic, DrawnSolids, InputError, Parameter, Product
 from factory.support.errors import Position
 from factory.support.texts import where
 from factory.theory.lang.words import is_label
@@ -234,5 +233,5 @@ EVERYWHERE = 5e-4
 def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
     """The allowance for a drawing without fits, such as an LDraw model: any two parts may overlap
     by up to 0.5 mm. Empty if no overlap needs it."""
-    needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
+    needed = any(pair.depth <= EVERYWHERE for pair in DrawnSolids.overlaps(product).pairs)
     return (AllowedOverlap(EVERYWHERE),) if needed else ()

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Replica
-from factory.engine.mjcf.model import SKELETON
+from factory.api import Model, Replica
 from factory.engine.mjcf.scene import FILL, KEY
 from factory.film.painter import Renderer
 from factory.support.arrays import Array, Indices
@@ -29,7 +28,7 @@ def loose_parts(
 ) -> mujoco.MjModel:
     """Bodies that are free to move, in the order of `surfaces`: vertices (n, 3) [m] and faces
     (m, 3) by label. `floor`: its height; `size`: that of the product [m]."""
-    spec = mujoco.MjSpec.from_string(SKELETON.read_text("utf-8"))
+    spec = mujoco.MjSpec.from_string(Model.SKELETON.read_text("utf-8"))
     world = spec.worldbody
     ground = {"name": "floor", "type": mujoco.mjtGeom.mjGEOM_PLANE, "material": "floor"}
     world.add_geom(**ground, size=(FLOOR * size, FLOOR * size, 0.1), pos=(0, 0, floor))

@@ -11,8 +11,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid
-from factory.floor.geometry.overlap import drawn
+from factory.api import PAG, Assembly, Diagnostic, DrawnSolids, InputError, Mesh, Product, Solid
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
 from factory.support.meshes.triangles import is_closed
@@ -47,7 +46,7 @@ def refuse_hidden(source: InPlace, pairs: Sequence[Overlapping]) -> None:
             for pair in pairs
             if part.label in (pair.one, pair.other)
         ]
-        if others and drawn(part.solid) is None:
+        if others and DrawnSolids.body(part.solid) is None:
             mesh = part.solid.mesh
             is_open = mesh is not None and not is_closed(mesh.faces)
             state = "is open" if is_open else "bounds no volume"

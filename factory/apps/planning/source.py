@@ -13,6 +13,7 @@ from factory.api import (
     PAG,
     Assembly,
     Diagnostic,
+    DrawnSolids,
     InputError,
     Product,
     Solid,
@@ -32,7 +33,6 @@ from factory.apps.planning.faults import check_in_place, check_places, raise_if_
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
 from factory.floor.geometry.decomposition import can_decompose
-from factory.floor.geometry.overlap import drawn
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean
@@ -216,7 +216,7 @@ def _beside_open(product: Product) -> set[str]:
     """The parts that bound no volume, and those whose boxes meet theirs: what these block is known
     by convex bodies."""
     solids = product.solids
-    boxes = [solid for solid in solids.values() if drawn(solid) is None]
+    boxes = [solid for solid in solids.values() if DrawnSolids.body(solid) is None]
     return {
         label
         for label, solid in solids.items()

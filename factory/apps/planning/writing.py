@@ -11,12 +11,11 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Template, expand, product_geometry, write_pag
+from factory.api import PAG, Assembly, DrawnSolids, Template, expand, product_geometry, write_pag
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.titles import Titles
-from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
 from factory.theory.problem.pag import AllowedOverlap
@@ -140,7 +139,7 @@ def _meant(
     units = {part.label: label for label, parts in source.units() for part in parts}
     pairs = [{*name.split(":")} for name in allow]
     deep: dict[tuple[str, str], float] = {}
-    for pair in overlaps_of(product).pairs:
+    for pair in DrawnSolids.overlaps(product).pairs:
         is_thread = (pair.one in threaded) != (pair.other in threaded)
         needed = pair.depth > pag.most_allowed(pair.one, pair.other)
         if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):

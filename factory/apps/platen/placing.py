@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Detour, Layout, LayoutMachines, LayoutSearch
-from factory.floor.layout.certificate import Region
+from factory.api import Detour, Layout, LayoutMachines, LayoutSearch, Region
 from factory.support.arrays import Array, Index, Truth
 from factory.support.boxes import Point2
 

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout, LayoutSearch
+from factory.api import Factory, Hand, Layout, LayoutSearch, dimensions
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.floor.layout.hands.holding import held
 from factory.floor.layout.hands.kinds import BELOW
@@ -20,7 +20,6 @@ from factory.floor.layout.hands.one_hand import OneHand
 from factory.floor.layout.hands.places import Places, centre_of
 from factory.floor.layout.hands.tips import STRONG
 from factory.support.boxes import Point2
-from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 InLine = tuple[tuple[Hand | None, ...], set[int]]
 """The hands of a factory with relays, and the robots (of the factory without) whose lanes are
@@ -134,7 +133,7 @@ class _Choice:
         parts = self.holding.factory.contents[held(self.holding.factory, pieces[-1])]
         middle = float(centre_of(layout.product, parts)[1][across])
         c = self.holding.clearance
-        room = c.spread - ARM_WIDTH / 2 - c.c / 2
+        room = c.spread - dimensions.ARM_WIDTH / 2 - c.c / 2
         line = min(max(middle, under - room), under + room)
         return Lane(path.heading, toward, line, side * way)
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout, LayoutSearch, Operation
-from factory.floor.layout.dimensions import FINGER
+from factory.api import Factory, Hand, Layout, LayoutSearch, Operation, dimensions
 from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.floor.layout.hands.holding import Holding, held
 from factory.floor.layout.hands.in_the_way import InTheWay, Passed
@@ -95,7 +94,7 @@ class HandsApartInLanes(HandsApart):
         if robot in self.kept:
             kept, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
-            free &= places.radius <= max(kept.radius, FINGER / 2) + SAME
+            free &= places.radius <= max(kept.radius, dimensions.FINGER / 2) + SAME
             return free & super().own_side(robot, kind, places, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
         wide = widths(places.radius) / 2

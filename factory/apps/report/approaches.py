@@ -7,11 +7,10 @@ from html import escape
 
 import numpy as np
 
-from factory.api import Finder, Node, Operation, Product
+from factory.api import Approach, Finder, Node, Operation, Product
 from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
 from factory.theory.compiler.expanding import nodes_of
-from factory.theory.plant.approaches import Approach
 
 COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 

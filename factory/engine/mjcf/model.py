@@ -14,6 +14,7 @@ from functools import cached_property
 from math import ceil
 from pathlib import Path
 from types import MappingProxyType
+from typing import ClassVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -29,7 +30,7 @@ from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.engine.mjcf.insets import Insets, insets_of
 from factory.engine.mjcf.jaws import add_jaws
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
-from factory.engine.mjcf.parts import add_meshes, add_parts, add_wholes
+from factory.engine.mjcf.parts import HIDDEN, add_meshes, add_parts, add_wholes
 from factory.engine.mjcf.robot_bodies import add_robots
 from factory.engine.mjcf.robots import MOTOR, Drive, add_paints
 from factory.engine.mjcf.scene import add_scene
@@ -81,6 +82,9 @@ class Model:
         bins: bins for scrap.
         overlaps: diagnostics of parts that overlap in the finished product.
     """
+
+    HIDDEN: ClassVar[float] = HIDDEN
+    SKELETON: ClassVar[Path] = SKELETON
 
     layout: Layout
     settings: Settings

@@ -31,11 +31,7 @@ STEADY = 4
 
 def steady_from(period: int = 1) -> int:
     """The number of products from which on a cycle time is measured, so that the last half of them
-    has a whole period.
-
-    Args:
-        period: number of units in a cycle of the net.
-    """
+    has a whole period (a number of units)."""
     return max(STEADY, 2 * period if period > 1 else 0)
 
 
@@ -137,6 +133,22 @@ class Run:
 
     def _repr_html_(self) -> str | None:
         return drawn(self)
+
+    @staticmethod
+    def steady_from(period: int = 1) -> int:
+        """The number of products from which on a cycle time is measured, where so many units are
+        made in a cycle of the net."""
+        return steady_from(period)
+
+    @staticmethod
+    def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
+        """Mean interval [s] between times of departure in the long run; None for too few."""
+        return mean_interval(left, period)
+
+    @staticmethod
+    def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
+        """Time that each robot spent in completed operations [s]."""
+        return busy_times(factory, events)
 
     @property
     def fired(self) -> int:

@@ -2,7 +2,7 @@
 
 Robots live below the plane z0 = PAYLOAD, payloads above it, so a robot passes under any payload.
 From the floor up: carriages; arms, above any carriage, met by masts only; fingers, above any mast;
-payloads.
+payloads. The sizes that robot types keep, such as the widths of masts and arms, are theirs.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from factory.support.decimals import up
-from factory.theory.problem.robot_bodies import CARRIAGE, MAST
+from factory.theory.problem.robot_bodies import ARM_WIDTH as ARM_WIDTH
+from factory.theory.problem.robot_bodies import CARRIAGE
+from factory.theory.problem.robot_bodies import MAST as MAST
 
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
 """The layers in which things can meet, from the floor up. What stands on the floor is in all of

@@ -7,12 +7,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.certificate import Certificate, Fault, Precedence, Region
+from factory.floor.layout.certificate import Certificate, Exclusions, Fault, Precedence, Region
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.coordinating import Coordinated, with_machines
 from factory.floor.layout.crowding import Crowding, crowding_faults
 from factory.floor.layout.embedding import certified
-from factory.floor.layout.exclusions import awaited_positions, coordinated
+from factory.floor.layout.exclusions import awaited_positions, coordinated, waiting_for_ever
 from factory.floor.layout.feeding import cleared, feeder_of, passing
 from factory.floor.layout.guidepath import Feeder
 from factory.floor.layout.hands.leaving import homes
@@ -117,6 +117,29 @@ class LayoutMachines:
         """The coordinated net with passes of robots on their way home and order places of one's
         own in place of those of the certificate."""
         return with_machines(self.layout, passes, orders)
+
+    def kept_apart(
+        self, orders: Sequence[tuple[Past, Operation, int]], backs: Mapping[int, float]
+    ) -> Exclusions:
+        """What keeps machines apart where each of some operations starts only after a pass, at most
+        so many times more often, and robots (index) return by themselves to arc lengths [m]; with a
+        fault where the coordinated net is not live."""
+        passes = tuple(dict.fromkeys(past for past, *_ in orders))
+        net = self.coordinated_with(passes)
+        called = [transition.name for transition in net.net.net.transitions]
+        before = {past: called[net.net.right[place]] for past, (place, _) in net.passes.items()}
+        places = tuple(
+            Precedence(
+                f"order:{before[past]}:{operation.label}",
+                before[past],
+                called[operation.start],
+                tokens,
+            )
+            for past, operation, tokens in orders
+        )
+        if (whole := self.coordinated_with(passes, places)).deadlock:
+            return Exclusions(faults=(waiting_for_ever(self.layout, whole),))
+        return Exclusions(passes=passes, orders=places, backs=tuple(backs.items()))
 
     @property
     def awaited(self) -> dict[int, float]:

@@ -103,11 +103,15 @@ def together(several: Iterable[Matings]) -> Matings:
 
 @dataclass(frozen=True)
 class Matings:
-    """The judgements of a product's operations, inputs before the operations that take them."""
+    """The judgements of a product's operations, how their inputs come together.
+
+    Attributes:
+        all: of each operation, inputs before the operations that take them.
+        parts: of each input of a blocked operation.
+    """
 
     all: tuple[Mating, ...]
     parts: Mapping[str, tuple[str, ...]] = field(repr=False)
-    """The parts of each input of a blocked operation."""
 
     @cached_property
     def approaches(self) -> Mapping[str, Approach]:

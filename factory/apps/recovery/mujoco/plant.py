@@ -149,10 +149,8 @@ class MujocoPlant(Plant):
             self.supplied()
 
     def lost(self) -> Sequence[int]:
-        units = (
-            (robot, self._holdings.unit(self._holdings.code(robot)))
-            for robot in self._senses.lost()
-        )
+        holdings, lost = self._holdings, self._senses.lost()
+        units = ((robot, holdings.unit(holdings.code(robot))) for robot in lost)
         return [robot for robot, unit in units if unit is not None and unit < SCRAP]
 
     def knocked(self, robot: int) -> bool:
