@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from factory.engine.record.state import Recorder as Recorder
     from factory.engine.record.state import State as State
     from factory.engine.record.subject import MonitorSubject as MonitorSubject
+    from factory.engine.record.subject import MonitorTable as MonitorTable
     from factory.engine.record.verdict import RunVerdict as RunVerdict
     from factory.engine.simulation.modelling import physical_model as physical_model
     from factory.engine.simulation.mujoco.world import MujocoWorld as MujocoWorld
@@ -52,6 +53,7 @@ if TYPE_CHECKING:
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.hands.choosing import Hands as Hands
     from factory.floor.layout.hands.hand import Hand as Hand
+    from factory.floor.layout.hands.misses import NoGrip as NoGrip
     from factory.floor.layout.layout import Layout as Layout
     from factory.floor.layout.layout_machines import LayoutMachines as LayoutMachines
     from factory.floor.layout.layout_search import LayoutSearch as LayoutSearch
@@ -62,14 +64,12 @@ if TYPE_CHECKING:
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
-    from factory.support.bounds import WorldName as WorldName
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
     from factory.support.errors import RunError as RunError
     from factory.support.settings import Settings as Settings
     from factory.theory.compiler.expanding import Node as Node
-    from factory.theory.compiler.expanding import expand as expand
     from factory.theory.control.laws import Setting as Setting
     from factory.theory.control.laws import navigation as navigation
     from factory.theory.control.mode import Limits as Limits
@@ -102,6 +102,7 @@ if TYPE_CHECKING:
     from factory.theory.plant.robot import Robot as Robot
     from factory.theory.problem.pag import NOPART as NOPART
     from factory.theory.problem.pag import PAG as PAG
+    from factory.theory.problem.pag import AllowedOverlap as AllowedOverlap
     from factory.theory.problem.pag import Assembly as Assembly
     from factory.theory.problem.pag import Parameter as Parameter
     from factory.theory.problem.pag import Value as Value
@@ -112,9 +113,8 @@ if TYPE_CHECKING:
 HOMES = {
     "support.errors": "Diagnostic FactoryError InputError RunError",
     "support.settings": "Settings",
-    "support.bounds": "WorldName",
     "support.apps": "App",
-    "theory.problem.pag": "Assembly NOPART PAG Parameter Value",
+    "theory.problem.pag": "Assembly NOPART PAG Parameter Value AllowedOverlap",
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue",
     "theory.problem.template": "Template",
@@ -136,7 +136,7 @@ HOMES = {
     "theory.plant.operation": "Operation",
     "theory.plant.robot": "Robot",
     "theory.plant.approaches": "Approach",
-    "theory.compiler.expanding": "Node expand",
+    "theory.compiler.expanding": "Node",
     "floor.geometry.meshes": "Mesh",
     "floor.geometry.solids": "Product Solid",
     "floor.geometry.product": "product_geometry",
@@ -156,6 +156,7 @@ HOMES = {
     "floor.layout.layout_machines": "LayoutMachines",
     "floor.layout.layout_search": "LayoutSearch",
     "floor.layout.bending": "Detour",
+    "floor.layout.hands.misses": "NoGrip",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.replica": "Geoms Replica",
@@ -167,7 +168,7 @@ HOMES = {
     "engine.record.failures": "Failing Failures",
     "engine.record.findings": "Report",
     "engine.record.state": "Event Observation Observer Recordable Recorder State",
-    "engine.record.subject": "MonitorSubject",
+    "engine.record.subject": "MonitorSubject MonitorTable",
     "engine.record.verdict": "RunVerdict",
     "engine.simulation.modelling": "physical_model",
     "engine.simulation.mujoco.world": "MujocoWorld",

@@ -11,9 +11,6 @@ from typing import Any, ClassVar, Literal
 
 from factory.support.errors import Diagnostic, InputError
 
-LONGEST = 1e9
-"""Upper bound on a time given by the user [s]: 30 years."""
-
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
 
@@ -70,6 +67,8 @@ class Settings:
 
     Raises InputError (BadValue) with every value out of its range.
     """
+
+    MOST_BRANCHES: ClassVar[int] = MOST_BRANCHES
 
     RANGES: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from factory.api import Diagnostic, Layout, LayoutMachines, RunError, Solid
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
 from factory.apps.arms.scene import StandingBox
-from factory.floor.layout.staying import in_world
 from factory.support.arrays import Array
 from factory.support.boxes import Box
 
@@ -76,9 +73,8 @@ def _hand_of(line: Line, bare: Layout) -> Iterator[StandingBox]:
     path, (x, y) = bare.guidepaths[line.carrier], line.station
     (u, v), (s, t) = path.heading, path.side
     at = x - u * path.reach + s * path.offset, y - v * path.reach + t * path.offset
-    for limb in LayoutMachines(bare).limbs(line.carrier):
-        ((low, high),) = in_world(np.array([[limb.low, limb.high]]), path.heading, at)
-        yield StandingBox(limb_name(limb.name, line), tuple(low.tolist()), tuple(high.tolist()))
+    for name, (low, high) in LayoutMachines(bare).limbs_at(line.carrier, at):
+        yield StandingBox(limb_name(name, line), tuple(low.tolist()), tuple(high.tolist()))
 
 
 def _feeder_of(cell: Arrangement, carrier: int, bare: Layout) -> Iterator[StandingBox]:

@@ -13,6 +13,7 @@ from factory.api import (
     Model,
     Project,
     RunError,
+    Timing,
     Verdict,
     physical_model,
 )
@@ -29,7 +30,6 @@ from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names, write_all
 from factory.theory.plant.programs import Program
 
@@ -132,7 +132,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     would be written through a link, or over what was read. Nothing is written then."""
     request.claim(project.name)
     layout, settings, output = project.layout, project.settings, request.output
-    operation_modes(layout, settings.eps)
+    _ = Timing(layout, settings).modes
     clearance = layout.certificate or LayoutMachines(layout).certify()
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)

@@ -15,7 +15,7 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Node, Template, expand
+from factory.api import NOPART, PAG, Node, Template
 from factory.apps.few_robots.parallel import Branches
 from factory.support.bounds import check_values
 
@@ -57,7 +57,7 @@ class Least:
 def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     """The bound for a product; for a mix, of the product that needs most, with the tools of all.
     Linear."""
-    nodes = expand(pag, templates)
+    nodes = Node.expand(pag, templates)
     needs: dict[str, int] = {}
     for label, node in nodes.items():
         needs[label] = _needed(node, templates, sorted(needs[x] for x in node.inputs))

@@ -18,7 +18,7 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.api import PAG, Assembly, Node, Pace, Plan, Template, expand
+from factory.api import PAG, Assembly, Node, Pace, Plan, Template
 from factory.apps.few_robots.lines import Admitted
 from factory.floor.mating.findings import Level
 from factory.support.boxes import Box
@@ -81,7 +81,7 @@ class FormsTask:
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
         """Its operations, in postorder."""
-        return expand(self.pag, self.templates)
+        return Node.expand(self.pag, self.templates)
 
     def size(self, label: str) -> float:
         """Length of the longer side of a sub-assembly on the floor [m]."""

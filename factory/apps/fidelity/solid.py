@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Model, Replica, names
-from factory.engine.mjcf.replica import SHOWN
+from factory.api import Geoms, Model, Replica, names
 from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
 
@@ -61,7 +60,7 @@ def drawn(m: mujoco.MjModel) -> Truth:
     body = [names.kind(m.body(int(b)).name) for b in m.geom_bodyid]
     part = np.isin(body, ["part", names.SHELL])
     plane = m.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    return np.asarray(np.where(part, m.geom_group != 1, (m.geom_group < SHOWN) & ~plane))
+    return np.asarray(np.where(part, m.geom_group != 1, (m.geom_group < Geoms.SHOWN) & ~plane))
 
 
 def _overlapping(low: Array, high: Array) -> Index:

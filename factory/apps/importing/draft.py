@@ -10,11 +10,19 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.api import PAG, Assembly, Diagnostic, DrawnSolids, InputError, Parameter, Product
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    Diagnostic,
+    DrawnSolids,
+    InputError,
+    Parameter,
+    Product,
+)
 from factory.support.errors import Position
 from factory.support.texts import where
 from factory.theory.lang.words import is_label
-from factory.theory.problem.pag import RESERVED, AllowedOverlap
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""
@@ -76,10 +84,10 @@ def label_of(name: str) -> str:
     >>> label_of("Left wing (2x4).ldr")
     'Left-wing-2x4-.ldr'
     """
-    if is_label(name) and name not in RESERVED and not _FOREIGN.search(name):
+    if is_label(name) and name not in PAG.RESERVED and not _FOREIGN.search(name):
         return name[:_LONGEST]
     label = _FOREIGN.sub("-", name)[:_LONGEST].strip("-.")
-    return f"{label}-" if label in RESERVED else label
+    return f"{label}-" if label in PAG.RESERVED else label
 
 
 def file_stem(name: str) -> str:

@@ -41,7 +41,6 @@ from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone
 from factory.support.claim import is_claimed
 from factory.support.files import LOG, head_of
 from factory.support.tables import misfit
-from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]
 
@@ -162,7 +161,7 @@ class Log:
         """Time [s] and name of every transition that fired and was not undone."""
         if not self.undone:
             return self.events
-        kept, entries = lasting(self.entries), self.timed_entries
+        kept, entries = Undone.lasting(self.entries), self.timed_entries
         return tuple((t, e) for t, e in (entries[at] for at in kept) if isinstance(e, str))
 
 

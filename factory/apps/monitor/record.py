@@ -16,6 +16,7 @@ from factory.api import (
     Factory,
     Failures,
     MonitorSubject,
+    MonitorTable,
     Observation,
     Report,
     RunVerdict,
@@ -30,8 +31,6 @@ from factory.apps.monitor.calm import judge_calm
 from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.record.findings import Violation
-from factory.engine.record.subject import MonitorTable
-from factory.engine.timing.demand import Word
 from factory.support.tables import value_of
 from factory.theory.nets.replay import replay
 
@@ -54,8 +53,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     m = model_of(log)
     with of_its_factory():
         subject = recorded_subject(log.header)
-        if word := word_of(log, subject.factory):
-            subject = replace(subject, word=word, wip=None)
+        if log.units is not None:
+            subject = _on_demand(log, subject)
         if log.failures is not None and log.failures != Failures():
             report = judge_calm(log, subject, m, partial(observations, log))
         else:
@@ -145,17 +144,18 @@ def _rows(log: Log, first: int, last: int | None) -> Iterator[tuple[Log | Ends, 
             yield log, row, False
 
 
-def word_of(log: Log, factory: Factory) -> Word | None:
-    """The word of a recorded run of a factory on demand; None for a fixed sequence."""
-    if log.units is None:
-        return None
-    demand = value_of(Demand, log.header["demand"])
+def _on_demand(log: Log, subject: MonitorSubject) -> MonitorSubject:
+    """The subject of a recorded run on demand, with its word. Raises ValueError where that is not
+    what was ordered."""
+    assert log.units is not None
+    demand, header = value_of(Demand, log.header["demand"]), log.header
     *units, fixed = log.units
-    word = Word(factory.sequence, demand, log.header["units"], log.header["wip"], units, fixed)
+    sequence = subject.factory.sequence
+    word = demand.word(sequence, header["units"], header["wip"], units, fixed)
     for number, product in enumerate(word.products(0, len(units))):
         if not demand.allows(number, product):
             raise ValueError(f"unit {number + 1} is a {product}, which was not the next order")
-    return word
+    return replace(subject, word=word, wip=None)
 
 
 @of_its_factory()

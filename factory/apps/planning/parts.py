@@ -11,12 +11,21 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Diagnostic, DrawnSolids, InputError, Mesh, Product, Solid
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    Diagnostic,
+    DrawnSolids,
+    InputError,
+    Mesh,
+    Product,
+    Solid,
+)
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
 from factory.support.meshes.triangles import is_closed
 from factory.support.texts import listing
-from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
 

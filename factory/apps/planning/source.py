@@ -41,7 +41,6 @@ from factory.support.meshes.mesh_file import ANEW
 from factory.support.meshes.triangles import convex_hull
 from factory.support.rotations import rotation
 from factory.support.texts import quoted
-from factory.theory.problem.pag import SHAPES
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
@@ -148,7 +147,7 @@ def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]
     """A node, after its mesh, if it has one, was added to the store."""
     if node.inputs:
         return node
-    if not any(p.name in SHAPES for p in node.parameters):
+    if not any(p.name in PAG.SHAPES for p in node.parameters):
         message = f"'{node.label}' has no shape: its place is known only from the tree"
         hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
         faults.append(Diagnostic("MissingPart", message, node.position, hint))

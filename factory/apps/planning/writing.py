@@ -11,14 +11,22 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Assembly, DrawnSolids, Template, expand, product_geometry, write_pag
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    DrawnSolids,
+    Node,
+    Template,
+    product_geometry,
+    write_pag,
+)
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.titles import Titles
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
-from factory.theory.problem.pag import AllowedOverlap
 
 Unit = TypeVar("Unit", bound=str | int)
 
@@ -144,7 +152,7 @@ def _meant(
         needed = pair.depth > pag.most_allowed(pair.one, pair.other)
         if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):
             deep[pair.one, pair.other] = pair.depth
-    judged = matings(expand(pag, templates), product).all if allow else ()
+    judged = matings(Node.expand(pag, templates), product).all if allow else ()
     for clash in (clash for mating in judged for clash in mating.clashes):
         both = {units[part] for part in clash.parts}
         if both in pairs or both & {*allow}:

@@ -16,8 +16,6 @@ import numpy as np
 
 from factory.api import Detour, Layout, LayoutMachines, Pace
 from factory.apps.platen.placing import Floor, Placing
-from factory.floor.layout.presence import ROUNDING
-from factory.floor.layout.way import Bend, rounding_for
 from factory.support.decimals import up
 
 TRIES, EFFORT = 220, 120_000
@@ -66,7 +64,7 @@ class Reach:
         at = {o.index: layout.visits[o.index, robot].at for o in gear}
         heads = [path.reach, *(at[o.index] for o in gear if o.carrier != robot)]
         tail = max((path.length - at[o.index] for o in gear if o.carrier == robot), default=0.0)
-        aside = [0.0, 0.0] if tail < ROUNDING else []
+        aside = [0.0, 0.0] if tail < LayoutMachines.ROUNDING else []
         if layout.magazine(robot):
             cleared = partial(LayoutMachines(layout).cleared, robot)
             tail, aside = max(tail, cleared(0.0)), [*map(cleared, (1.0, -1.0))] if aside else []
@@ -88,7 +86,7 @@ class _Search:
     def __init__(self, layout: Layout, pace: Pace, seed: int) -> None:
         self.layout, self.pace, self.ground = layout, pace, Floor(layout)
         self.most = SLOWER * pace.cycle_of(layout)
-        full = rounding_for(pace.speed, pace.acceleration)
+        full = pace.rounding
         self.roundings = [full, *(small for small in SHARPER if small < full)]
         self.rng = np.random.default_rng(seed)
         goes = [r for r, path in enumerate(layout.guidepaths) if r and path.travels]
@@ -162,9 +160,9 @@ class _Search:
         if tail == 0.0:
             least = reach.aside[int(across > 0)] + rounding
             far = max(up(abs(across)), up(least))
-            bend = Bend(at, float(np.copysign(far + BEYOND, across)))
-            return Detour(round(at + far - path.reach, 3), (bend,), rounding)
+            side = float(np.copysign(far + BEYOND, across))
+            return Detour.across(round(at + far - path.reach, 3), at, side, rounding)
         tail = max(up(tail), up(reach.tail + rounding))
         across = round(float(np.copysign(max(abs(across), 2 * rounding), across)), 3)
         travel = round(at + abs(across) + tail - path.reach, 3)
-        return Detour(travel, (Bend(at, across),), rounding)
+        return Detour.across(travel, at, across, rounding)

@@ -9,10 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from factory.api import NOPART, Catalogue, Factory, Guidepath, Layout, LayoutSearch, Template
+from factory.api import NOPART, Catalogue, Factory, Guidepath, Layout, LayoutSearch, Node, Template
 from factory.apps.relay.in_line import InLine, hands_in_line
 from factory.apps.relay.ways import Way
-from factory.theory.compiler.expanding import RELAY, relay_label
 from factory.theory.compiler.relays import with_relays
 
 
@@ -88,7 +87,7 @@ def _pieces(
             continue
         for relay, cut in enumerate(ways[label].cuts(factory.plan.relays[label])):
             yield Piece(chosen, start, cut)
-            start, chosen = cut, factory.by_label[relay_label(label, relay)].carrier
+            start, chosen = cut, factory.by_label[Node.relay_label(label, relay)].carrier
     yield Piece(chosen, start, layout.guidepaths[robot].travel)
 
 
@@ -108,4 +107,4 @@ def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
 def origin_of(label: str) -> str:
     """Label before hand-overs."""
     origin, _, last = label.rpartition("/")
-    return origin if last.startswith(RELAY) else label
+    return origin if last.startswith(Node.RELAY) else label

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, WorldName
-from factory.support.bounds import check_values
+from factory.api import Diagnostic, InputError
+from factory.support.bounds import WorldName, check_values
 from factory.support.errors import usage_error
 
 if TYPE_CHECKING:

@@ -86,6 +86,8 @@ class Geoms:
         m: the model.
     """
 
+    SHOWN: ClassVar[int] = SHOWN
+
     def __init__(self, m: mujoco.MjModel) -> None:
         self.m = m
 

@@ -206,7 +206,16 @@ class MonitorSubject:
 
 @dataclass(frozen=True, slots=True)
 class MonitorTable:
-    """The fields of a `MonitorSubject` in a log."""
+    """The fields of a `MonitorSubject` in a log.
+
+    Attributes:
+        goals: arc length of the goal of each robot, for each operation [m].
+        radii: radius of the goal ball of each operation [m].
+        places: by label, a centre of mass in the frame of the product [m].
+        patience: time without an event until a run counts as stalled [s].
+        early: (operation, robot) where a robot goes ahead regardless of the settings.
+        bends: bends of guidepaths, row by row.
+    """
 
     goals: tuple[tuple[float, ...], ...]
     radii: tuple[float, ...]

@@ -30,6 +30,11 @@ class Detour:
     bends: tuple[Bend, ...] = ()
     rounding: float = 0.0
 
+    @classmethod
+    def across(cls, travel: float, at: float, across: float, rounding: float) -> Detour:
+        """A detour with one bend: after a distance so far to the side [m]."""
+        return cls(travel, (Bend(at, across),), rounding)
+
     @property
     def first(self) -> tuple[Bend, float] | None:
         """Its first bend, and the rounding [m]; None where it is straight."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
 
 from factory.floor.layout.bending import Detour, bent
 from factory.floor.layout.certificate import Certificate, Exclusions, Fault, Precedence, Region
@@ -21,9 +24,9 @@ from factory.floor.layout.hanging import Hanging
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.outfeed import away, shed_with_uprights
-from factory.floor.layout.presence import Presence
+from factory.floor.layout.presence import ROUNDING, Presence
 from factory.floor.layout.starting import start_positions
-from factory.floor.layout.staying import Staying
+from factory.floor.layout.staying import Staying, in_world
 from factory.floor.layout.sweeps import piles_of, regions, regions_of
 from factory.support.arrays import Array
 from factory.support.boxes import Box, Point2
@@ -42,11 +45,20 @@ class LayoutMachines:
         layout: the layout.
     """
 
+    ROUNDING: ClassVar[float] = ROUNDING
+
     layout: Layout
 
     def limbs(self, robot: int) -> tuple[Limb, ...]:
         """The limbs of a robot's hand; none for a tool, or where nothing can hold."""
         return limbs(self.layout, robot)
+
+    def limbs_at(self, robot: int, at: Point2) -> Iterator[tuple[str, Array]]:
+        """The name of each limb of a robot's hand, and its box (2, 3) where the robot's carriage
+        stands at a point of the floor [m]."""
+        for limb in self.limbs(robot):
+            heading = self.layout.guidepaths[robot].heading
+            yield limb.name, in_world(np.array([[limb.low, limb.high]]), heading, at)[0]
 
     def feeder(self, label: str) -> Feeder:
         """The feeder of a part."""
