@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from factory.engine.timing.demand import Demand as Demand
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
+    from factory.film.painter import Renderer as Renderer
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
     from factory.floor.geometry.drawn_solids import DrawnSolids as DrawnSolids
@@ -179,6 +180,7 @@ HOMES = {
     "pipeline": "Project",
     "film.picture": "Picture",
     "film.shot": "Shot",
+    "film.painter": "Renderer",
 }
 """The names by the modules that define them, in the order of the house."""
 

@@ -68,6 +68,7 @@ class Settings:
     Raises InputError (BadValue) with every value out of its range.
     """
 
+    FILE: ClassVar[str] = "factory.toml"
     MOST_BRANCHES: ClassVar[int] = MOST_BRANCHES
 
     RANGES: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(

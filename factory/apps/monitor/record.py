@@ -19,6 +19,7 @@ from factory.api import (
     MonitorTable,
     Observation,
     Report,
+    Run,
     RunVerdict,
     WeldFrames,
 )
@@ -32,7 +33,6 @@ from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
 from factory.engine.record.findings import Violation
 from factory.support.tables import value_of
-from factory.theory.nets.replay import replay
 
 JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
@@ -103,7 +103,7 @@ def verdict_on(
     """The verdict on a recorded run of a factory, from its log, the report of a monitor on it where
     there is one, and the faults of its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
-    refines = replay(factory.net, log.entries, start, factory.joins).refines
+    refines = Run.is_refined(factory, log.entries, start)
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)

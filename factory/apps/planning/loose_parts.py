@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Model, Replica
-from factory.engine.mjcf.scene import FILL, KEY
-from factory.film.painter import Renderer
+from factory.api import Model, Renderer, Replica
 from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
 from factory.support.gl import probe
@@ -33,7 +31,8 @@ def loose_parts(
     ground = {"name": "floor", "type": mujoco.mjtGeom.mjGEOM_PLANE, "material": "floor"}
     world.add_geom(**ground, size=(FLOOR * size, FLOOR * size, 0.1), pos=(0, 0, floor))
     kind = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    for name, ray, shadow, diffuse in (("key", KEY, True, 0.5), ("fill", FILL, False, 0.15)):
+    lights = ("key", Renderer.KEY, True, 0.5), ("fill", Renderer.FILL, False, 0.15)
+    for name, ray, shadow, diffuse in lights:
         at = -3.0 * size * np.asarray(ray)
         light = {"name": name, "dir": ray, "pos": at, "type": kind, "castshadow": shadow}
         world.add_light(**light, diffuse=[diffuse] * 3, specular=[0.1 * shadow] * 3)

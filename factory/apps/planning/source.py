@@ -32,7 +32,6 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.decomposition import can_decompose
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean
@@ -200,7 +199,7 @@ def placed(
     BadValue)."""
     product = product_geometry(pag, files, decomposed=False)
     solids = dict(product.solids)
-    if can_decompose() and (beside := _beside_open(product)):
+    if DrawnSolids.can_decompose() and (beside := _beside_open(product)):
         nodes = [node for node in pag.parts() if node.label in beside]
         whole = Assembly(pag.root, "mate", tuple(node.label for node in nodes))
         solids |= product_geometry(replace(pag, nodes=(whole, *nodes)), files).solids
@@ -208,7 +207,8 @@ def placed(
     for node in pag.parts():
         solid = solids[node.label]
         parts.append(PlacedPart(node.label, *surface(solid), node.label, solid, node))
-    return tuple(parts), (*product.warnings, *(() if can_decompose() else _hulls(parts)))
+    hulls = () if DrawnSolids.can_decompose() else _hulls(parts)
+    return tuple(parts), (*product.warnings, *hulls)
 
 
 def _beside_open(product: Product) -> set[str]:
@@ -231,7 +231,7 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         file = str(part.node.parameter("mesh"))
         if file not in warnings and hull_stands(part.solid.mesh):
             message = f"{file} is not convex; its convex hull is used instead"
-            hint = AS_BODIES if can_decompose() else DECOMPOSE
+            hint = AS_BODIES if DrawnSolids.can_decompose() else DECOMPOSE
             many = f"meshes are not convex: their convex hulls are used ({hint})"
             warnings[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
     return list(warnings.values())

@@ -15,6 +15,8 @@ from factory.engine.record.state import Event
 from factory.engine.record.verdict import RunVerdict
 from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
+from factory.theory.nets.petri import Marking
+from factory.theory.nets.replay import replay
 from factory.theory.nets.undone import Entry, Undone, lasting
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import is_end, operation_of
@@ -133,6 +135,12 @@ class Run:
 
     def _repr_html_(self) -> str | None:
         return drawn(self)
+
+    @staticmethod
+    def is_refined(factory: Factory, entries: Sequence[str | Undone], start: Marking) -> bool:
+        """Whether a record of a factory, firings and what was undone from a marking on, is one of
+        its net."""
+        return replay(factory.net, entries, start, factory.joins).refines
 
     @staticmethod
     def steady_from(period: int = 1) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from factory.floor.geometry.decomposition import can_decompose
 from factory.floor.geometry.overlap import Common, drawn, overlap_of
 from factory.floor.geometry.overlapping import DrawnOverlaps, near_pairs, overlaps_of
 from factory.floor.geometry.solids import Product, Solid
@@ -30,6 +31,11 @@ class DrawnSolids:
         """The volume that a part's surface bounds, as a `manifold3d.Manifold`, computed once; None
         for a mesh that bounds none."""
         return drawn(solid)
+
+    @staticmethod
+    def can_decompose() -> bool:
+        """Whether open meshes can be represented by convex pieces here."""
+        return can_decompose()
 
     @staticmethod
     def overlaps(product: Product) -> DrawnOverlaps:

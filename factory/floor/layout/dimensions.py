@@ -55,6 +55,9 @@ RISE = 1 / 3
 """No line of sight that rises by less than this share of its way in plan gets to a part in its
 housing, which is above the housing's lower edge by so much of the housing's diagonal."""
 
+APART = 0.02
+"""Robots keep so far from what lies about [m]."""
+
 BEHIND = 0.015
 """How far behind the shed's shutter a product ends."""
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 from factory.floor.mating.paths import TOLERANCE
 from factory.support.errors import Diagnostic, Position
@@ -109,6 +109,8 @@ class Matings:
         all: of each operation, inputs before the operations that take them.
         parts: of each input of a blocked operation.
     """
+
+    LEVEL: ClassVar[type[Level]] = Level
 
     all: tuple[Mating, ...]
     parts: Mapping[str, tuple[str, ...]] = field(repr=False)

@@ -138,6 +138,10 @@ class PAG(Pictured):
         parts = sum(1 for _ in self.parts())
         return f"<PAG {self.title}: {parts} parts, {len(self) - parts} operations, {self.file}>"
 
+    def mixed(self, counts: tuple[tuple[str, int], ...]) -> PAG:
+        """The graph of several products, so many of each in a period."""
+        return replace(self, mix=Mix(counts))
+
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:
         """The nodes by label."""

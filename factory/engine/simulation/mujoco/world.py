@@ -12,12 +12,14 @@ from copy import copy
 from dataclasses import replace
 from functools import partial
 from math import ceil
+from typing import ClassVar
 
 from factory.engine.mjcf.loading import compiled, fingerprint, load
 from factory.engine.mjcf.model import Model
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import EngineView, Observation
 from factory.engine.simulation.mujoco.courses import Points
+from factory.engine.simulation.mujoco.drives import INPUTS
 from factory.engine.simulation.mujoco.fast.neighbours import Neighbours
 from factory.engine.simulation.mujoco.fast.strides import Strides
 from factory.engine.simulation.mujoco.inspection import Inspection
@@ -66,6 +68,8 @@ class MujocoWorld:
 
     Raises InputError (BadMesh) where the engine refuses the model, with the engine's own words.
     """
+
+    INPUTS: ClassVar[int] = INPUTS
 
     instant = False
 
