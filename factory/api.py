@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from factory.engine.timing.demand import Demand as Demand
     from factory.engine.timing.timed import pace as pace
     from factory.engine.timing.timing import Timing as Timing
-    from factory.film.painter import Renderer as Renderer
     from factory.film.picture import Picture as Picture
     from factory.film.shot import Shot as Shot
     from factory.floor.geometry.drawn_solids import DrawnSolids as DrawnSolids
@@ -65,6 +64,7 @@ if TYPE_CHECKING:
     from factory.floor.robots.catalogue import load_catalogue as load_catalogue
     from factory.pipeline import Project as Project
     from factory.support.apps import App as App
+    from factory.support.bounds import WorldName as WorldName
     from factory.support.errors import Diagnostic as Diagnostic
     from factory.support.errors import FactoryError as FactoryError
     from factory.support.errors import InputError as InputError
@@ -115,6 +115,7 @@ HOMES = {
     "support.errors": "Diagnostic FactoryError InputError RunError",
     "support.settings": "Settings",
     "support.apps": "App",
+    "support.bounds": "WorldName",
     "theory.problem.pag": "Assembly NOPART PAG Parameter Value AllowedOverlap",
     "theory.problem.plan": "Plan",
     "theory.problem.robot_types": "Catalogue",
@@ -180,7 +181,6 @@ HOMES = {
     "pipeline": "Project",
     "film.picture": "Picture",
     "film.shot": "Shot",
-    "film.painter": "Renderer",
 }
 """The names by the modules that define them, in the order of the house."""
 

@@ -9,8 +9,6 @@ from typing import Any, Literal, get_args
 
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
-__all__ = ["BOUNDS", "WorldName", "check_values"]
-
 LONGEST = 1e9
 """Upper bound on a time given by the user [s]: 30 years."""
 

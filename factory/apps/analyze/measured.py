@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Diagnostic, Event, Factory, InputError, Run, Settings, Timing
+from factory.api import Diagnostic, Event, Factory, InputError, Run, Settings, Timing, WorldName
 from factory.apps.analyze.timed import Flow, TimedNet
 from factory.apps.log import Log
 from factory.apps.log.project_table import settings_of
 from factory.support.arrays import Array
-from factory.support.bounds import WorldName
 
 HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 

@@ -8,9 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Layout, LayoutMachines, Solid, dimensions
+from factory.api import Ground, Layout, LayoutMachines, Solid, dimensions
 from factory.apps.drawing.canvas import hexadecimal, hull
-from factory.floor.layout.tiles import tiles_of
 from factory.support.boxes import Box, Extent, Point2
 
 JUNCTION = 0.008
@@ -51,7 +50,7 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
     carriages go) and `last` (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot`
     or `tool`) of robots at home, `part`, `junction`."""
     yield Flat.of_box("floor", layout.floor)
-    yield from (Flat.of_box("tile", tile) for tile in tiles_of(layout))
+    yield from (Flat.of_box("tile", tile) for tile in Ground.tiles(layout))
     yield from _sweeps(layout)
     yield Flat.of_box("belt", layout.outfeed)
     leaves = layout.factory.leaves

@@ -15,9 +15,8 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Node, Template
+from factory.api import NOPART, PAG, Node, Settings, Template
 from factory.apps.few_robots.parallel import Branches
-from factory.support.bounds import check_values
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""
@@ -112,7 +111,7 @@ class Aim:
     def __post_init__(self) -> None:
         robots = None if self.robots == "least" else self.robots
         seconds = None if self.seconds == inf else self.seconds
-        check_values(
+        Settings.check_values(
             {"robots": robots, "cycle": self.cycle, "effort": self.effort, "seconds": seconds}
         )
 

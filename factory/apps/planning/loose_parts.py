@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Model, Renderer, Replica
+from factory.api import Model, Replica
+from factory.film.painter import Renderer
 from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
 from factory.support.gl import probe
