@@ -45,10 +45,10 @@ if TYPE_CHECKING:
     from factory.floor.geometry.product import product_geometry as product_geometry
     from factory.floor.geometry.solids import Product as Product
     from factory.floor.geometry.solids import Solid as Solid
-    from factory.floor.layout import dimensions as dimensions
     from factory.floor.layout.bending import Detour as Detour
     from factory.floor.layout.certificate import Certificate as Certificate
     from factory.floor.layout.certificate import Region as Region
+    from factory.floor.layout.dimensions import Dimensions as Dimensions
     from factory.floor.layout.durations import Pace as Pace
     from factory.floor.layout.guidepath import Guidepath as Guidepath
     from factory.floor.layout.hands.choosing import Hands as Hands
@@ -148,7 +148,6 @@ HOMES = {
     "floor.mating.findings": "Matings",
     "floor.layout.certificate": "Certificate Region",
     "floor.layout.durations": "Pace",
-    "floor.layout": "dimensions",
     "floor.layout.guidepath": "Guidepath",
     "floor.layout.hands.choosing": "Hands",
     "floor.layout.hands.hand": "Hand",
@@ -159,6 +158,7 @@ HOMES = {
     "floor.layout.layout_search": "LayoutSearch",
     "floor.layout.bending": "Detour",
     "floor.layout.hands.misses": "NoGrip",
+    "floor.layout.dimensions": "Dimensions",
     "engine.mjcf": "names",
     "engine.mjcf.model": "Model",
     "engine.mjcf.replica": "Geoms Replica",

@@ -10,7 +10,7 @@ from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Diagnostic, Operation, RunError, Solid, dimensions
+from factory.api import Diagnostic, Dimensions, Operation, RunError, Solid
 from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
@@ -325,7 +325,7 @@ class Arrangement(Handling):
     def _foot(self) -> Array:
         """The place in the product's frame that comes to where the product's middle is, on the
         floor (3,) [m]."""
-        return np.array([*self.product.middle[:2], self.product.low[2] - dimensions.PAYLOAD])
+        return np.array([*self.product.middle[:2], self.product.low[2] - Dimensions.PAYLOAD])
 
     def shown(self, label: str) -> Array:
         """How far from its place in the product's frame what an arm brings is as the arm takes it

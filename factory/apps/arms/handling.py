@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from factory.api import Factory, Layout, Product, dimensions
+from factory.api import Dimensions, Factory, Layout, Product
 from factory.apps.arms.body import STEM
 from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
@@ -160,11 +160,11 @@ class Handling:
     @cached_property
     def top(self) -> float:
         """Height of the product's top [m]."""
-        return dimensions.PAYLOAD + float(self.product.high[2] - self.product.low[2])
+        return Dimensions.PAYLOAD + float(self.product.high[2] - self.product.low[2])
 
     def _height(self, z: float) -> float:
         """Height of a place of the product's frame on a carrier [m]."""
-        return dimensions.PAYLOAD + z - float(self.product.low[2])
+        return Dimensions.PAYLOAD + z - float(self.product.low[2])
 
     def _lowest(self, label: str) -> float:
         """Height above its place in the product's frame of what is lowest of a burden, or of the

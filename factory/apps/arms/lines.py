@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from factory.api import (
+    Dimensions,
     Factory,
     Guidepath,
     Hand,
@@ -21,7 +22,6 @@ from factory.api import (
     Operation,
     Product,
     Region,
-    dimensions,
 )
 from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.scene import StandingBox
@@ -114,9 +114,9 @@ class Line:
         low, high = (float(end[2] - self.product.low[2]) for end in self._ends)
         hand = max(
             (limb.high[2] for limb in LayoutMachines(self.rails).limbs(0)),
-            default=dimensions.PAYLOAD,
+            default=Dimensions.PAYLOAD,
         )
-        return max(dimensions.PAYLOAD + high, hand + low)
+        return max(Dimensions.PAYLOAD + high, hand + low)
 
     @cached_property
     def behind(self) -> float:

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Ground, Layout, LayoutMachines, Solid, dimensions
+from factory.api import Dimensions, Ground, Layout, LayoutMachines, Solid
 from factory.apps.drawing.canvas import hexadecimal, hull
 from factory.support.boxes import Box, Extent, Point2
 
@@ -119,7 +119,7 @@ def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
         sides = sorted((limb.low[1] * path.left, limb.high[1] * path.left))
         box: Extent = (limb.low[0], limb.high[0], sides[0], sides[1])
         yield Flat.of_box("finger", path.world(box, foot))
-    arm: Extent = (0.0, rim, -dimensions.ARM_WIDTH / 2, dimensions.ARM_WIDTH / 2)
+    arm: Extent = (0.0, rim, -Dimensions.ARM_WIDTH / 2, Dimensions.ARM_WIDTH / 2)
     yield Flat.of_box("arm", path.world(arm, foot))
     carriage = Flat.of_box(style, path.world((-half, half, -half, half), foot))
     yield replace(carriage, name=layout.factory.robots[robot].name)

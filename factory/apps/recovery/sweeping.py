@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Layout, LayoutMachines, Mode, dimensions
+from factory.api import Dimensions, Layout, LayoutMachines, Mode
 from factory.support.arrays import Array, Index
 
 
@@ -28,11 +28,11 @@ class SweptFloor:
     def near(self, places: Array, radii: Array) -> frozenset[int]:
         """The robots that come near balls with `radii` (k,) about `places` (k, 2) [m]."""
         least, most = places.min(axis=0), places.max(axis=0)
-        far = float(radii.max()) + dimensions.APART + Mode.ROUNDING
+        far = float(radii.max()) + Dimensions.APART + Mode.ROUNDING
         about = (self.boxes[:, [1, 3]] > least - far) & (self.boxes[:, [0, 2]] < most + far)
         here = about.all(axis=1)
         (x, y), box = places.T[:, :, None], self.boxes[here][None]
         away = np.maximum(np.maximum(box[..., 0] - x, x - box[..., 1]), 0.0) ** 2
         away += np.maximum(np.maximum(box[..., 2] - y, y - box[..., 3]), 0.0) ** 2
-        hit = (away < (radii[:, None] + dimensions.APART) ** 2).any(axis=0)
+        hit = (away < (radii[:, None] + Dimensions.APART) ** 2).any(axis=0)
         return frozenset(self.robots[here][hit].tolist())

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Hands, Layout, LayoutSearch, dimensions
+from factory.api import Dimensions, Factory, Hand, Hands, Layout, LayoutSearch
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
 from factory.support.boxes import Point2
 
@@ -127,7 +127,7 @@ class _Choice:
         under = float(layout.product.middle[across]) + path.offset * way
         middle = float(self.holding.centre(self.holding.held(pieces[-1]))[across])
         c = self.holding.clearance
-        room = c.spread - dimensions.ARM_WIDTH / 2 - c.c / 2
+        room = c.spread - Dimensions.ARM_WIDTH / 2 - c.c / 2
         line = min(max(middle, under - room), under + room)
         return Lane(path.heading, toward, line, side * way)
 

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from factory.api import Factory, Hand, Hands, Layout, LayoutSearch, Operation, dimensions
+from factory.api import Dimensions, Factory, Hand, Hands, Layout, LayoutSearch, Operation
 from factory.support.arrays import Array, Truth
 from factory.support.boxes import Point2
 
@@ -95,7 +95,7 @@ class HandsApartInLanes(Hands.Apart):
         if robot in self.kept:
             kept, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
-            free &= places.radius <= max(kept.radius, dimensions.FINGER / 2) + SAME
+            free &= places.radius <= max(kept.radius, Dimensions.FINGER / 2) + SAME
             return free & super().own_side(robot, kind, places, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
         wide = self.widths(places) / 2

@@ -8,6 +8,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+from factory.engine.record.history import firings
 from factory.engine.record.state import Recordable
 from factory.engine.timing.demand import Word
 from factory.engine.timing.pool import with_wip
@@ -18,7 +19,6 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import BendRows, BentWay, Ways, kept_in, rows_of
 from factory.support.settings import Settings
 from factory.support.tables import table_of
-from factory.theory.nets.history import firings
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking
 from factory.theory.plant.factory import Factory

@@ -11,12 +11,12 @@ from factory.engine.record.ending import CutOff
 from factory.engine.record.failures import Failures
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.findings import Report
+from factory.engine.record.replay import replay
 from factory.engine.record.state import Event
 from factory.engine.record.verdict import RunVerdict
 from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.replay import replay
 from factory.theory.nets.undone import Entry, Undone, lasting
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import is_end, operation_of

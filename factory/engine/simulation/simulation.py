@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from factory.engine.mjcf.timestep import timed
 from factory.engine.record.figures import PhysicsFigures
+from factory.engine.record.history import firings
+from factory.engine.record.replay import replay
 from factory.engine.record.state import Observer, State
 from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.distributed import DistributedSupervisor
@@ -34,9 +36,7 @@ from factory.floor.modes.staging import HeadStart, stages_of
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.theory.control.mode import Limits
-from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.replay import replay
 
 if TYPE_CHECKING:
     from factory.engine.mjcf.loading import EngineModel
