@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from factory.film.colours import AMBER, DEAD
 from factory.film.history import History
+from factory.support.errors import listing
 from factory.support.pictures.ink import (
     FAINT,
     FLASH,
@@ -18,7 +19,7 @@ from factory.support.pictures.ink import (
     fitted,
     width,
 )
-from factory.support.texts import counted, listing
+from factory.support.texts import counted
 
 BAR = 0.82
 """Opacity of the bars that words stand on."""

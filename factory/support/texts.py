@@ -4,14 +4,13 @@ messages."""
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from lark import Token
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
-__all__ = ["Source", "counted", "listing", "near_file", "quoted", "source_of", "where"]
+__all__ = ["Source", "counted", "near_file", "quoted", "source_of", "where"]
 
 FILES = 1000
 """Maximum number of names of a folder that are compared with a missing one."""
@@ -100,15 +99,3 @@ def quoted(text: str) -> str:
     if shown.startswith('"'):
         return shown
     return f'"{shown}"' if "'" in shown else f"'{shown}'"
-
-
-def listing(names: Iterable[str], most: int = 6) -> str:
-    """Names in a sentence: the first few, then how many more.
-
-    Args:
-        names: the names.
-        most: number of names that are written.
-    """
-    every = list(names)
-    shown = ", ".join(every[:most])
-    return shown + (f" and {len(every) - most} more" if len(every) > most else "")

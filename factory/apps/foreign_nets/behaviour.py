@@ -18,8 +18,7 @@ from factory.api import Defect, GearNet, GearProof, MarkedNet, Verdict
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.support.collector import collector_paused
-from factory.support.errors import Position
-from factory.support.texts import listing
+from factory.support.errors import Position, listing
 
 WORK = 5_000_000
 """Greatest number of places visited by the search for an unsafe one."""

@@ -13,7 +13,7 @@ from itertools import islice
 import networkx as nx
 
 from factory.api import Defect, Gear, MarkedNet
-from factory.support.texts import listing
+from factory.support.errors import listing
 from factory.theory.problem.ids import PlaceId, TransitionId
 
 

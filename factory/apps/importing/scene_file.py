@@ -18,11 +18,11 @@ import numpy as np
 
 from factory.apps.importing import threemf_file
 from factory.apps.importing.bodies import MOST_PARTS, Bodies, FileBody, most_of, solids_of
+from factory.support.errors import listing
 from factory.support.files import MESH, read_bytes
 from factory.support.meshes.glb_reader import Colour, GlbBody, read_glb
 from factory.support.meshes.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked
 from factory.support.meshes.mesh_reader import read_mesh
-from factory.support.texts import listing
 from factory.support.version import optional
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")

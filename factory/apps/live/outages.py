@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.apps.recovery import Recovery
 from factory.film.marks import Zone, Zones
-from factory.support.texts import listing
+from factory.support.errors import listing
 
 LONG = 1e8
 """A feeder that is empty for so long [s] is blocked by hand, which is shown elsewhere."""

@@ -15,8 +15,8 @@ import numpy as np
 from factory.api import Diagnostic, DrawnSolids, InputError
 from factory.apps.planning.parts import PlacedPart
 from factory.support.arrays import Array
+from factory.support.errors import listing
 from factory.support.meshes.bodies import connected
-from factory.support.texts import listing
 
 LARGER = 50.0
 """A part that is more than this many times larger than the largest other part, or smaller than the

@@ -12,8 +12,8 @@ from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import CannotAssemble, Planned
 from factory.apps.planning.posing import in_words
 from factory.apps.planning.writing import planned_product
+from factory.support.errors import listing
 from factory.support.files import head_of, own_names, write_all
-from factory.support.texts import listing
 
 HEAD = b"# written by `factory plan`: equal screws are brought by one robot, and driven in by one\n"
 """The first line of the settings that are written with a plan."""

@@ -24,8 +24,8 @@ from factory.api import (
 )
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
+from factory.support.errors import listing
 from factory.support.meshes.triangles import is_closed
-from factory.support.texts import listing
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
 

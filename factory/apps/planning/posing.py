@@ -17,7 +17,7 @@ from factory.apps.planning.shanks import shank_of
 from factory.apps.planning.standing import STEADY, TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
 from factory.support.arrays import Array
-from factory.support.texts import listing
+from factory.support.errors import listing
 
 AS_DRAWN: Direction = (2, +1)
 """z is up."""

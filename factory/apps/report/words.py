@@ -9,7 +9,7 @@ from typing import Any
 from factory.api import Factory, Verdict, verify
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
-from factory.support.texts import listing
+from factory.support.errors import listing
 
 NAMES = {
     "gear_net": "Gear net",

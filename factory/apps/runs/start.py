@@ -6,8 +6,7 @@ from collections.abc import Iterable
 
 from factory.api import Diagnostic, GearNet, InputError, Marking
 from factory.engine.record.history import unreached
-from factory.support.errors import Position, did_you_mean
-from factory.support.texts import listing
+from factory.support.errors import Position, did_you_mean, listing
 
 
 def legal_marking(net: GearNet, names: str) -> Marking:

@@ -30,7 +30,7 @@ from factory.floor.layout.machines import presences
 from factory.floor.layout.nearness import Near, near
 from factory.floor.layout.presence import Presence
 from factory.floor.layout.staying import carried_ahead
-from factory.support.texts import listing
+from factory.support.errors import listing
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, overlap, times

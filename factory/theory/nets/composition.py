@@ -18,7 +18,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
-from factory.support.texts import listing
+from factory.support.errors import listing
 from factory.theory.nets.gears import Gear
 from factory.theory.nets.marked import MANY, NONE, MarkedNet
 from factory.theory.nets.verdict import Defect

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar
 
+from factory.support.errors import listing
 from factory.support.showing import Pictured
-from factory.support.texts import listing
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet
 from factory.theory.problem.ids import TransitionId

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
-from factory.support.texts import listing
+from factory.support.errors import listing
 from factory.theory.nets.composition import MOST, Composition, named
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verdict import Defect

@@ -17,8 +17,7 @@ from dataclasses import dataclass
 from itertools import islice
 
 from factory.support.collector import collector_paused
-from factory.support.errors import Diagnostic, Position, RunError
-from factory.support.texts import listing
+from factory.support.errors import Diagnostic, Position, RunError, listing
 from factory.theory.nets.composition import MOST, Composition, named
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet

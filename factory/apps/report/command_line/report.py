@@ -8,7 +8,6 @@ from pathlib import Path
 
 import click
 
-from factory.api import Run
 from factory.apps.runs.options import RunOptions
 from factory.commands import options as shared
 from factory.commands.defaults import with_defaults
@@ -51,6 +50,7 @@ def report(
     Runs FILE.pag, or takes the run in a LOG of `run --log`. The page is always written. The exit
     status is 1 if the run failed, or was cut off before its units were made; --lenient ignores what
     its bodies do, and with --strict a run whose success is qualified fails."""
+    from factory.api import Run
     from factory.apps.log import is_log
     from factory.apps.report.page import report_on
     from factory.support.files import write_text
