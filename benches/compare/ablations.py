@@ -14,7 +14,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.exclusions import coordinated
 from factory.floor.layout.layout import Layout
-from factory.theory.nets.verdict import listing
+from factory.support.errors import listing
 
 NAMES, UNITS = ("paper", "lamp", "stool", "truck", "chair", "gearbox"), 4
 

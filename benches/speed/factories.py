@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import cast
 
 from benches.fidelity.products import EXAMPLES
+from factory.engine.record.replay import replay
 from factory.engine.record.verdict import RunVerdict
 from factory.engine.simulation.mujoco.courses import Course
 from factory.engine.simulation.request import RunRequest
@@ -22,7 +23,6 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.request import Ground
 from factory.pipeline import read
 from factory.support.settings import MOST, Settings
-from factory.theory.nets.replay import replay
 
 LAYOUTS = "FACTORY_BENCH_LAYOUTS"
 """The environment's name of a folder in which a bench keeps layouts for all of its processes."""

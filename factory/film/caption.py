@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from factory.film.colours import AMBER, DEAD
 from factory.film.history import History
+from factory.support.errors import listing
 from factory.support.pictures.ink import (
     FAINT,
     FLASH,
@@ -19,7 +20,6 @@ from factory.support.pictures.ink import (
     width,
 )
 from factory.support.texts import counted
-from factory.theory.nets.verdict import listing
 
 BAR = 0.82
 """Opacity of the bars that words stand on."""

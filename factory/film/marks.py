@@ -14,7 +14,7 @@ from factory.engine.mjcf.replica import Replica
 from factory.film.action import Snapshot
 from factory.film.colours import AMBER, DEAD
 from factory.film.history import History
-from factory.floor.layout.sweeping import APART
+from factory.floor.layout.dimensions import APART
 from factory.support.engine import mujoco
 from factory.support.pictures.ink import FLASH, Colour
 

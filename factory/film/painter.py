@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import ClassVar
 
 import numpy as np
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import SHOWN, Replica
+from factory.engine.mjcf.scene import FILL, KEY
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Fading, Snapshot
 from factory.film.filament import Filament
@@ -96,7 +98,15 @@ class Painter(Closing):
 
 
 class Renderer(Closing):
-    """Draws a replica as a view has it, with a GL context of its own."""
+    """Draws a replica as a view has it, with a GL context of its own.
+
+    Attributes:
+        KEY: direction of the light that casts the shadows.
+        FILL: direction of the other light.
+    """
+
+    KEY: ClassVar[tuple[float, float, float]] = KEY
+    FILL: ClassVar[tuple[float, float, float]] = FILL
 
     def __init__(self, replica: Replica, size: Size) -> None:
         self.replica, m = replica, replica.m

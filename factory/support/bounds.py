@@ -8,7 +8,9 @@ from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.support.settings import LONGEST
+
+LONGEST = 1e9
+"""Upper bound on a time given by the user [s]: 30 years."""
 
 Bounds = tuple[float, float]
 

@@ -11,7 +11,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
-__all__ = ["MissingError", "Position", "StoppedError", "did_you_mean", "one_line", "usage_error"]
+__all__ = [
+    "MissingError",
+    "Position",
+    "StoppedError",
+    "did_you_mean",
+    "listing",
+    "one_line",
+    "usage_error",
+]
 
 SHOWN = 100
 """Maximum number of diagnostics that are printed; the others are counted."""
@@ -182,3 +190,15 @@ def did_you_mean(word: str, valid: Sequence[str], noun: str = "") -> str:
         return f"there is no {noun} to choose from" if noun else ""
     shown = ", ".join(valid[:12]) + (", ..." if len(valid) > 12 else "")
     return f"valid {noun or 'names'}: {shown}"
+
+
+def listing(names: Iterable[str], most: int = 6) -> str:
+    """Names in a sentence: the first few, then how many more.
+
+    Args:
+        names: the names.
+        most: number of names that are written.
+    """
+    every = list(names)
+    shown = ", ".join(every[:most])
+    return shown + (f" and {len(every) - most} more" if len(every) > most else "")

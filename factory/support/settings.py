@@ -9,10 +9,8 @@ from numbers import Integral, Real
 from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
+from factory.support.bounds import BOUNDS, check_values
 from factory.support.errors import Diagnostic, InputError
-
-LONGEST = 1e9
-"""Upper bound on a time given by the user [s]: 30 years."""
 
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
@@ -71,6 +69,10 @@ class Settings:
     Raises InputError (BadValue) with every value out of its range.
     """
 
+    BOUNDS: ClassVar[Mapping[str, tuple[float, float]]] = BOUNDS
+    FILE: ClassVar[str] = "factory.toml"
+    MOST_BRANCHES: ClassVar[int] = MOST_BRANCHES
+
     RANGES: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
         {
             "speed": (1e-3, 100.0),
@@ -99,6 +101,12 @@ class Settings:
     settle: float = 0.0
     outfeed: float = 1.0
     stage: int = 0
+
+    @staticmethod
+    def check_values(values: Mapping[str, object]) -> None:
+        """Check values of a run or a search by their names. Raises InputError (Usage) with every
+        fault."""
+        check_values(values)
 
     def __post_init__(self) -> None:
         for name in SWITCHES:

@@ -14,7 +14,7 @@ from factory.support.errors import Diagnostic, InputError, Position, did_you_mea
 from factory.support.settings import MOST_BRANCHES, Settings, wrong_type
 from factory.support.toml_files import key_position, read_toml
 
-NAME = "factory.toml"
+NAME = Settings.FILE
 
 OPTIONS: Mapping[str, object] = {
     "world": "mujoco",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from copy import deepcopy
 from xml.etree.ElementTree import Element, SubElement
 
-__all__ = ["add", "exact", "number", "numbers"]
+__all__ = ["add", "exact", "number", "numbers", "prefixed"]
 
 Number = float | int
 
@@ -53,3 +54,15 @@ def _text(value: object) -> str:
     if isinstance(value, int | float):
         return number(value)
     return numbers(value)  # type: ignore[arg-type]
+
+
+def prefixed(element: Element, prefix: str, names: bool = False) -> Element:
+    """A copy in which references to classes and assets are prefixed, and names too if wanted."""
+    copy = deepcopy(element)
+    for node in copy.iter():
+        for key in ("class", "childclass", "material", "mesh", "texture"):
+            if key in node.attrib:
+                node.set(key, f"{prefix}/{node.get(key)}")
+        if names and "name" in node.attrib:
+            node.set("name", f"{prefix}/{node.get('name')}")
+    return copy

@@ -18,6 +18,7 @@ from factory.engine.simulation.mujoco.supply import Supply
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.run import Run
 from factory.engine.simulation.simulation import Simulation
+from factory.engine.timing.demand import Demand, Word
 from factory.floor.layout import resting
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.presence import STILL
@@ -28,7 +29,6 @@ from factory.theory.compiler.mixing import even
 from factory.theory.lang.pag_reader import read_pag
 from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.threaded import Threads
-from factory.theory.plant.demand import Demand, Word
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from tests.command_line import Terminal

@@ -23,6 +23,7 @@ from factory.apps.few_robots.folding import (
     lines_of_labels,
 )
 from factory.apps.runs.start import legal_marking
+from factory.engine.record.history import firings
 from factory.engine.timing.cycle_time import CycleTime
 from factory.floor.geometry.product import product_geometry
 from factory.floor.layout.bounds import _Bound
@@ -30,7 +31,6 @@ from factory.floor.layout.durations import Pace
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.history import firings
 from factory.theory.nets.marked import MarkedNet, marked
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import proved, verify

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.apps.runs.start import legal_marking
+from factory.engine.record.history import firings
+from factory.engine.record.replay import replay
 from factory.support.errors import InputError
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.history import firings
-from factory.theory.nets.replay import replay
 from factory.theory.nets.threaded import ThreadedNet
 from factory.theory.plant.factory import Factory
 from tests.net_values import fair_run, net_from, random_legal_marking

@@ -7,7 +7,7 @@ from math import pi
 
 import numpy as np
 
-from factory.api import Factory, marked
+from factory.api import Factory, MarkedNet
 from factory.apps.drawing.canvas import Point
 from factory.apps.recovery.undo import undo
 from factory.floor.layout.way import Bend, Ways
@@ -131,7 +131,7 @@ def _cell(
 
 def draw_counts(factory: Factory) -> str:
     """How often each transition has fired, before and after one is undone."""
-    net = marked(factory.net)
+    net = MarkedNet.of(factory.net)
     counts, tokens = [0] * len(net.net.transitions), list(net.tokens)
     number = {t.name: event for event, t in enumerate(net.net.transitions)}
     while counts[number[UNTIL]] < TIMES:

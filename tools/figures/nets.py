@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from factory.api import Factory, marked
+from factory.api import Factory, MarkedNet
 from factory.apps.exports.swimlanes import swimlanes
 from tools.figures.sheet import RADIUS, SMALL, WIDTH, Sheet
 
@@ -22,7 +22,7 @@ class LaneNet:
 
     def __init__(self, factory: Factory, top: float, order: Sequence[int] = ()) -> None:
         self.factory, self.net = factory, factory.net.threaded
-        self.at = swimlanes(marked(factory.net))
+        self.at = swimlanes(MarkedNet.of(factory.net))
         first, last = min(self.at.x), max(self.at.x)
         self.pitch = (WIDTH - 128.0) / (last - first + 120.0)
         self.first = first

@@ -14,7 +14,6 @@ from factory.api import Diagnostic, Event, Factory, InputError, Run, Settings, T
 from factory.apps.analyze.timed import Flow, TimedNet
 from factory.apps.log import Log
 from factory.apps.log.project_table import settings_of
-from factory.engine.simulation.run import mean_interval
 from factory.support.arrays import Array
 
 HINT = "`factory run FILE.pag --log OUT` writes one that fits"
@@ -128,7 +127,7 @@ def compare(timing: Timing, net: TimedNet, flow: Flow, record: RunRecord) -> Com
     return Comparison(
         record.source,
         len(left),
-        ComparedFigure(net.pace, mean_interval(left, factory.period)),
+        ComparedFigure(net.pace, Run.mean_interval(left, factory.period)),
         ComparedFigure(flow.first, left[0] if left else None),
         ComparedFigure(flow.last, last),
         tuple(compared),

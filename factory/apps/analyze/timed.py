@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.api import NONE, MarkedNet, PetriNet, Place, Timing, steady_from
+from factory.api import MarkedNet, PetriNet, Place, Run, Timing
 from factory.apps.analyze.firing import Slack, circuits
 from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Change
@@ -156,8 +156,8 @@ def _gears(
         for step, number in enumerate(robot.operations):
             way = ways.get((robot.index, number), number)
             if way != number and seconds[way] > seconds[gear.waiting(step)] + seconds[number]:
-                slowest[2 * step], slowest[2 * step + 1] = way, NONE
-        places = tuple(p for p in slowest if p != NONE)
+                slowest[2 * step], slowest[2 * step + 1] = way, MarkedNet.NONE
+        places = tuple(p for p in slowest if p != MarkedNet.NONE)
         gears.append(_circuit(gear.robot, places, seconds, tokens, timing.factory.period))
     return gears
 
@@ -290,7 +290,7 @@ def steady_units(timing: Timing) -> int:
 def reached(dates: Array, pace: float, period: int = 1) -> int:
     """The same number, for the `dates` [s] of at least 4 dropoffs, with `period` of them in a
     cycle; the number of all if the pace is not reached."""
-    least = steady_from(period)
+    least = Run.steady_from(period)
     units = np.arange(least, len(dates) + 1)
     count = units - units // 2
     count -= count % period

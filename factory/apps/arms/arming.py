@@ -11,23 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from factory.api import (
-    PAG,
-    Assembly,
-    Catalogue,
-    Diagnostic,
-    Factory,
-    InputError,
-    Plan,
-    Project,
-    read_template,
-)
+from factory.api import PAG, Assembly, Diagnostic, Factory, InputError, Plan, Project, read_template
 from factory.apps.arms.body import STEM_MASS, mass_of
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import RAILS, dealt
 from factory.apps.arms.model import ArmModel
-from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
-from factory.theory.problem.robot_types import RobotType
 
 PLACE = """
 place = (R, j, ~, <a; b>, F) where
@@ -69,13 +57,6 @@ ACROSS = 0
 
 TRIES = 12
 """How many other orders of the inputs of joins are tried."""
-
-
-def robot_type(model: ArmModel) -> RobotType:
-    """The robot type of an arm: a dot whose axis moves all joints of its chain."""
-    moves = tuple((joint, joint) for joint in model.chain.joints)
-    axis = RobotAxis(WAY, float(model.chain.inertia.mass.sum()) + STEM_MASS, moves=moves)
-    return RobotType(model.kind, model.file, RobotBody(CARRIAGE, mass_of(model), (axis,)), "dot")
 
 
 def armed(project: Project, model: ArmModel, arms: Sequence[CellArm] = (CellArm(),)) -> Project:
@@ -190,7 +171,8 @@ def _placing(project: Project, model: ArmModel, orders: Mapping[str, Sequence[st
     """The project with a place for each join; `orders` of inputs other than the usual one."""
     kind, catalogue = model.kind, project.catalogue
     pag = replace(project.pag, nodes=tuple(_nodes(project.pag, orders)))
-    types = {**catalogue.types, kind: robot_type(model)}
+    moved = float(model.chain.inertia.mass.sum()) + STEM_MASS
+    masses, joints = (mass_of(model), moved), model.chain.joints
     texts = {"place": PLACE, "pick": PICK, "show": SHOW}
     added = {
         name: read_template(text.format(kind=kind), f"{kind}.op") for name, text in texts.items()
@@ -200,7 +182,7 @@ def _placing(project: Project, model: ArmModel, orders: Mapping[str, Sequence[st
         project,
         pag=pag,
         templates={**project.templates, **added},
-        catalogue=Catalogue(types),
+        catalogue=catalogue.with_chain(kind, model.file, "dot", masses, joints),
         lowered=lowered,
     )
 

@@ -10,7 +10,7 @@ from math import asin, copysign, cos, pi, sin, sqrt
 
 import numpy as np
 
-from factory.api import Diagnostic, Operation, RunError, Solid
+from factory.api import Diagnostic, Dimensions, Operation, RunError, Solid
 from factory.apps.arms.body import Stand
 from factory.apps.arms.cell import Well, well_of
 from factory.apps.arms.chain import SerialChain
@@ -18,7 +18,6 @@ from factory.apps.arms.crew import RAILS
 from factory.apps.arms.handling import Handling
 from factory.apps.arms.lines import BEHIND, LANE, Line, depth, overlap, pedestal, wrist
 from factory.apps.arms.reach import Ring, ring_of
-from factory.floor.layout.dimensions import PAYLOAD
 from factory.support.arrays import Array
 from factory.support.boxes import Box, Point2, hull
 from factory.support.rotations import about_vertical
@@ -326,7 +325,7 @@ class Arrangement(Handling):
     def _foot(self) -> Array:
         """The place in the product's frame that comes to where the product's middle is, on the
         floor (3,) [m]."""
-        return np.array([*self.product.middle[:2], self.product.low[2] - PAYLOAD])
+        return np.array([*self.product.middle[:2], self.product.low[2] - Dimensions.PAYLOAD])
 
     def shown(self, label: str) -> Array:
         """How far from its place in the product's frame what an arm brings is as the arm takes it

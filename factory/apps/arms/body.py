@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.apps.arms.chain import SerialChain
 from factory.apps.arms.model import ArmModel
-from factory.engine.mjcf.robots import prefixed
+from factory.support.xml_writer import prefixed
 
 STEM, PAD = 0.10, 0.004
 """Length of the tool, of which its pad [m]."""

@@ -15,12 +15,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from factory.api import Factory, Hand, Product, Solid
+from factory.api import Dimensions, Factory, Hand, Product, Solid
 from factory.apps.arms.body import STEM, Stand, add, standing
 from factory.apps.arms.curves import LegTable, SoughtLegs
 from factory.apps.arms.holds import UP, facing_up, product_of, quaternion
 from factory.apps.arms.model import ArmModel
-from factory.floor.layout.dimensions import PAD, PAYLOAD, PLAY, RISE, WALL
 from factory.floor.layout.guidepath import Feeder
 from factory.support.arrays import Array
 from factory.support.boxes import Point2
@@ -196,24 +195,24 @@ def well_of(
     at = (low + high)[:2] / 2
     tall = float(high[2] - low[2])
     room = clearance / 2
-    stroke = room + RISE * hypot(2 * half[0], 2 * half[1]) + tall
+    stroke = room + Dimensions.RISE * hypot(2 * half[0], 2 * half[1]) + tall
     rim = show - room
-    bottom = show - stroke - PAD - BELOW
+    bottom = show - stroke - Dimensions.PAD - BELOW
     x, y = place[0] - at[0] + middle[0], place[1] - at[1] + middle[1]
     off = at - middle[:2]
     inside = (
-        float(off[0] - half[0] - PLAY),
-        float(off[0] + half[0] + PLAY),
-        float(off[1] - half[1] - PLAY),
-        float(off[1] + half[1] + PLAY),
+        float(off[0] - half[0] - Dimensions.PLAY),
+        float(off[0] + half[0] + Dimensions.PLAY),
+        float(off[1] - half[1] - Dimensions.PLAY),
+        float(off[1] + half[1] + Dimensions.PLAY),
     )
     box = (
-        x + inside[0] - WALL,
-        x + inside[1] + WALL,
-        y + inside[2] - WALL,
-        y + inside[3] + WALL,
+        x + inside[0] - Dimensions.WALL,
+        x + inside[1] + Dimensions.WALL,
+        y + inside[2] - Dimensions.WALL,
+        y + inside[3] + Dimensions.WALL,
     )
-    elevation = show - (PAYLOAD + float(low[2] - product.low[2]))
+    elevation = show - (Dimensions.PAYLOAD + float(low[2] - product.low[2]))
     feeder = Feeder(0.0, 0.0, inside, box, box, box, max(bottom, FLOOR), rim, -stroke)
     return Well((float(x), float(y)), elevation, feeder)
 
@@ -223,4 +222,4 @@ def shown_height(solids: Sequence[Solid], clearance: float) -> float:
     [m]."""
     tallest = max(float(s.high[2] - s.low[2]) for s in solids)
     widest = max(hypot(*(s.high - s.low)[:2].tolist()) for s in solids)
-    return FLOOR + BELOW + PAD + clearance / 2 + RISE * widest + tallest
+    return FLOOR + BELOW + Dimensions.PAD + clearance / 2 + Dimensions.RISE * widest + tallest

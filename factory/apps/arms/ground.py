@@ -8,7 +8,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from factory.api import Factory, Ground, InputError, Layout, Product, Project, Settings
+from factory.api import (
+    Factory,
+    Ground,
+    InputError,
+    Layout,
+    LayoutSearch,
+    Product,
+    Project,
+    Settings,
+)
 from factory.apps.arms.arming import armed, from_one_side, on_rails, piles_of
 from factory.apps.arms.cell_arm import CellArm
 from factory.apps.arms.crew import arms_in, asked_arms
@@ -49,10 +58,10 @@ class CellGround(Ground):
     def lay_out(self, factory: Factory, product: Product, settings: Settings, *_: Any) -> Layout:
         """The layout of the cell. Raises RunError (Layout, Unreachable, NoWay)."""
         from factory.apps.arms.laying import laid_out
-        from factory.floor.mating.mating import judged
 
         assert self.model is not None
-        factory, product = from_one_side(judged(factory, product)), product.repeated(factory)
+        joined = LayoutSearch(factory, product).judged
+        factory, product = from_one_side(joined), product.repeated(factory)
         rails = dict[int, Layout]()
         for label, project in self.rails.items():
             carrier = factory.by_label[label].carrier

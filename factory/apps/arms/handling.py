@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from factory.api import Factory, Layout, Product
+from factory.api import Dimensions, Factory, Layout, Product
 from factory.apps.arms.body import STEM
 from factory.apps.arms.burdens import Burden, burden_of
 from factory.apps.arms.cell import GAP, down, shown_height
@@ -17,7 +17,6 @@ from factory.apps.arms.holds import facing_up, product_of, quaternion
 from factory.apps.arms.lines import Line, line_of
 from factory.apps.arms.rises import Rise
 from factory.floor.geometry.suction import GAP as SUCTION_GAP
-from factory.floor.layout.dimensions import PAYLOAD
 from factory.support.arrays import Array
 from factory.support.rotations import about_vertical
 
@@ -161,11 +160,11 @@ class Handling:
     @cached_property
     def top(self) -> float:
         """Height of the product's top [m]."""
-        return PAYLOAD + float(self.product.high[2] - self.product.low[2])
+        return Dimensions.PAYLOAD + float(self.product.high[2] - self.product.low[2])
 
     def _height(self, z: float) -> float:
         """Height of a place of the product's frame on a carrier [m]."""
-        return PAYLOAD + z - float(self.product.low[2])
+        return Dimensions.PAYLOAD + z - float(self.product.low[2])
 
     def _lowest(self, label: str) -> float:
         """Height above its place in the product's frame of what is lowest of a burden, or of the

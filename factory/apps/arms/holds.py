@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Solid
+from factory.api import Hand, Solid
 from factory.apps.arms.body import PAD_RADIUS
 from factory.apps.arms.chain import cross
 from factory.apps.arms.dynamics import GRAVITY
 from factory.floor.geometry.suction import PadPlace, pad_place
-from factory.floor.layout.hands.tips import tip
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
@@ -61,7 +60,7 @@ class Hold:
         force = mass * GRAVITY
         moment = cross(centre - self.pad.at, force)
         radius = np.array(self.pad.radius)
-        return float(tip("suction").used(-self.normal, radius, np.zeros(3), force, moment))
+        return float(Hand.tip_of("suction").used(-self.normal, radius, np.zeros(3), force, moment))
 
 
 def facing_up(normal: Array) -> Array:

@@ -20,9 +20,11 @@ from factory.api import (
     Guidepath,
     Hand,
     Layout,
+    LayoutMachines,
+    LayoutSearch,
     Product,
+    Region,
     RunError,
-    payload_boxes,
 )
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.body import with_tool
@@ -36,22 +38,13 @@ from factory.apps.arms.orders import (
     BEYOND,
     InEachOthersWay,
     PrivateParts,
-    exclusions_of,
     next_tour,
     orders_at_sources,
     orders_of,
     private_parts,
+    with_orders,
 )
 from factory.apps.arms.planning import CERTAIN, ArmPlanner, ArmTour
-from factory.floor.layout.certificate import (
-    ARM_BODY,
-    POST_BODY,
-    Exclusions,
-    Region,
-)
-from factory.floor.layout.dimensions import PAYLOADS
-from factory.floor.layout.hands.leaving import homes
-from factory.floor.layout.visits import Visit, visits_of
 
 ASIDE = 0.0, 1.2, 1.8
 """Angles that are tried as `Arrangement.aside` [rad]."""
@@ -145,10 +138,10 @@ def _with_legs(cell: Arrangement, arm: ArmModel, pace: WayLimits) -> Layout:
     private = private_parts(planners, tours)
     chains = _chains(cell, arm, planners, tours, private)
     layout = _layout(cell, tours, chains)
-    alone = homes(layout)
+    alone = LayoutMachines(layout).homes
     asked = [*orders_of(cell, tours, private), *orders_at_sources(cell, tours, alone)]
-    apart = exclusions_of(layout, asked, tours, alone)
-    return replace(layout, certificate=_certificate(cell, layout, apart))
+    certified = replace(layout, certificate=_certificate(cell, layout))
+    return with_orders(certified, asked, tours, alone)
 
 
 def _borne(cell: Arrangement, planner: ArmPlanner, tour: ArmTour, pace: WayLimits) -> ArmTour:
@@ -250,7 +243,8 @@ def _layout(
         for o in factory.operations
     ]
     robots = range(len(factory.robots))
-    visits = visits_of(factory, [paths[n] for n in robots], stations)
+    search = LayoutSearch(factory, cell.product)
+    visits = search.visits([paths[n] for n in robots], stations)
     for label, burden in cell.burdens.items():
         key = factory.by_label[label].index, cell.arm_of[label]
         at = arm.middle(visits[key].at)
@@ -260,7 +254,7 @@ def _layout(
         else:
             place, elevation = cell.lines[burden.source].stand(burden.takes), 0.0
         shift = place[0] - at[0], place[1] - at[1]
-        visits[key] = Visit(visits[key].at, 0.0, 0.0, elevation, shift)
+        visits[key] = replace(visits[key], lift=0.0, up=0.0, elevation=elevation, shift=shift)
     for t in every:
         key = cell.burdens[t.label].join.index, cell.arm_of[t.label]
         visits[key] = replace(visits[key], at=t.stop, shift=(t.stop - REACH, 0.0))
@@ -271,7 +265,7 @@ def _layout(
         guidepaths=tuple(paths[n] for n in robots),
         visits=visits,
         hands=tuple(hands.get(n) for n in robots),
-        payloads=payload_boxes(factory, cell.product),
+        payloads=search.payloads,
         floor=floor_of(cell),
         certificate=None,
         plain=None,
@@ -279,8 +273,8 @@ def _layout(
     )
 
 
-def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certificate:
-    """The certificate of a cell."""
+def _certificate(cell: Arrangement, layout: Layout) -> Certificate:
+    """The certificate of a cell, without what keeps its machines apart."""
     rails = cell.rails[0].certificate
     assert rails is not None
     return replace(
@@ -289,7 +283,7 @@ def _certificate(cell: Arrangement, layout: Layout, apart: Exclusions) -> Certif
         robots=tuple(robot.name for robot in cell.factory.robots),
         operations=tuple(operation.label for operation in cell.factory.operations),
         regions=tuple(_regions(cell, layout)),
-        apart=apart,
+        apart=replace(rails.apart, excluded=(), orders=(), passes=(), backs=(), faults=()),
     )
 
 
@@ -301,9 +295,9 @@ def _regions(cell: Arrangement, layout: Layout) -> Iterator[Region]:
     for arm, stand in cell.stands.items():
         (x, y, z), half = stand.place, 0.25 * cell.ring.outer
         box = x - half, x + half, y - half, y + half
-        yield Region(arm, PAYLOADS, ARM_BODY, box, (0.0, z + 0.7 * cell.ring.outer))
+        yield Region(arm, Region.PAYLOADS, Region.ARM, box, (0.0, z + 0.7 * cell.ring.outer))
     for label, well in cell.wells.items():
         arm = cell.arm_of[label]
-        yield Region(arm, PAYLOADS, POST_BODY, well.feeder.housing, (0.0, cell.top), label)
+        yield Region(arm, Region.PAYLOADS, Region.POST, well.feeder.housing, (0.0, cell.top), label)
     shed = layout.shed
-    yield Region(0, PAYLOADS, POST_BODY, shed, (0.0, cell.top))
+    yield Region(0, Region.PAYLOADS, Region.POST, shed, (0.0, cell.top))

@@ -12,12 +12,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
-from factory.api import Factory, Guidepath, Hand, Layout, Operation, Product
+from factory.api import (
+    Dimensions,
+    Factory,
+    Guidepath,
+    Hand,
+    Layout,
+    LayoutMachines,
+    Operation,
+    Product,
+    Region,
+)
 from factory.apps.arms.body import PEDESTAL, Stand
 from factory.apps.arms.scene import StandingBox
-from factory.floor.layout.certificate import PAYLOAD_BODY, Region
-from factory.floor.layout.dimensions import PAYLOAD, PAYLOADS
-from factory.floor.layout.hands.limbs import limbs
 from factory.support.arrays import Array
 from factory.support.boxes import Box, Point2, hull, moved
 
@@ -105,8 +112,11 @@ class Line:
     def top(self) -> float:
         """Height of its top, or of that of the carrier's hand [m]."""
         low, high = (float(end[2] - self.product.low[2]) for end in self._ends)
-        hand = max((limb.high[2] for limb in limbs(self.rails, 0)), default=PAYLOAD)
-        return max(PAYLOAD + high, hand + low)
+        hand = max(
+            (limb.high[2] for limb in LayoutMachines(self.rails).limbs(0)),
+            default=Dimensions.PAYLOAD,
+        )
+        return max(Dimensions.PAYLOAD + high, hand + low)
 
     @cached_property
     def behind(self) -> float:
@@ -185,7 +195,7 @@ class Line:
     @property
     def regions(self) -> Iterator[Region]:
         """The floor that the carrier and its tools take."""
-        yield Region(self.carrier, PAYLOADS, PAYLOAD_BODY, self.swept, (0.0, self.top))
+        yield Region(self.carrier, Region.PAYLOADS, Region.PAYLOAD, self.swept, (0.0, self.top))
         for tool in self.tools:
             yield from self.regions_of(tool)
 

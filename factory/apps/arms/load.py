@@ -6,14 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Diagnostic, RunError
+from factory.api import Diagnostic, Hand, RunError
 from factory.apps.arms.burdens import Burden
 from factory.apps.arms.cell import ToolGrip
 from factory.apps.arms.chain import SerialChain, cross
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.dynamics import GRAVITY, PLACES, torque_share
 from factory.apps.arms.joint_way import JointWay, WayLimits
-from factory.floor.layout.hands.tips import STRONG, tip
 from factory.support.arrays import Array
 
 STEP = 1e-4
@@ -56,7 +55,7 @@ class Load:
     def is_borne(self, pace: WayLimits, damping: Array) -> bool:
         """Whether neither a drive nor the tip of the tool needs more than it has (see `check`)."""
         needed = self.torques(pace, damping)
-        return bool((needed <= 1.0).all()) and self.pull(pace) <= STRONG
+        return bool((needed <= 1.0).all()) and self.pull(pace) <= Hand.STRONG
 
     def check(self, pace: WayLimits, damping: Array) -> None:
         """Check that neither a drive nor the tip of the tool needs more than it has, anywhere on
@@ -79,11 +78,11 @@ class Load:
             helps = bool((self.torques(slow, damping) <= 1.0).all())
             raise self._too_heavy(said, pace, self._most(pace, damping), slow if helps else None)
         used = self.pull(pace)
-        if used > STRONG:
+        if used > Hand.STRONG:
             what = {"suction": "pad", "pin": "pin"}[self.grip.kind]
             size = f"{1e3 * self.grip.radius:.3g} mm in radius"
             said = f"its {what}, {size}, bears {1 / used:.2g} times the load"
-            helps = self.pull(slow) <= STRONG
+            helps = self.pull(slow) <= Hand.STRONG
             raise self._too_heavy(said, pace, self.burden.mass / used, slow if helps else None)
 
     def torques(self, pace: WayLimits, damping: Array, times: float = 1.0) -> Array:
@@ -119,7 +118,7 @@ class Load:
                     (tool @ v[..., None])[..., 0] for v in (force, -push * spin - fast * turned)
                 )
                 moment = twist + cross(np.broadcast_to(self.center, force.shape), force)
-                used = tip(self.grip.kind).used(AHEAD, radius, np.zeros(3), force, moment)
+                used = Hand.tip_of(self.grip.kind).used(AHEAD, radius, np.zeros(3), force, moment)
                 worst = max(worst, float(used.max()))
         return worst
 

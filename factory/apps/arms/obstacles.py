@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
-from factory.api import Diagnostic, Layout, RunError, Solid
+from factory.api import Diagnostic, Layout, LayoutMachines, RunError, Solid
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.crew import RAILS
 from factory.apps.arms.lines import Line, overlap, pedestal, upright
 from factory.apps.arms.scene import StandingBox
-from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.hands.limbs import Limb, limbs
-from factory.floor.layout.outfeed import shed_with_uprights
-from factory.floor.layout.staying import in_world
 from factory.support.arrays import Array
 from factory.support.boxes import Box
 
@@ -32,9 +26,9 @@ def placed_name(label: str, line: Line) -> str:
     return f"'{label}' on {line.name}" if line.carrier else f"'{label}' in the product"
 
 
-def limb_name(limb: Limb, line: Line) -> str:
+def limb_name(limb: str, line: Line) -> str:
     """What a limb of a carrier's hand is called."""
-    return f"the {limb.name.rpartition('/')[2]} of {line.name}"
+    return f"the {limb.rpartition('/')[2]} of {line.name}"
 
 
 def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox]:
@@ -56,7 +50,7 @@ def obstacles(cell: Arrangement, arm: int, bare: Layout) -> Iterator[StandingBox
             yield from _part(solid, placed_name(label, line), cell.placed(carrier))
         yield from _hand_of(line, bare)
         yield from _feeder_of(cell, carrier, bare)
-    box, top = shed_with_uprights(bare)
+    box, top = LayoutMachines(bare).shed
     yield upright("the outfeed's shed", box, 0.0, top)
     yield upright("the outfeed", bare.outfeed, 0.0, cell.top)
     for other, stand in cell.stands.items():
@@ -79,15 +73,14 @@ def _hand_of(line: Line, bare: Layout) -> Iterator[StandingBox]:
     path, (x, y) = bare.guidepaths[line.carrier], line.station
     (u, v), (s, t) = path.heading, path.side
     at = x - u * path.reach + s * path.offset, y - v * path.reach + t * path.offset
-    for limb in limbs(bare, line.carrier):
-        ((low, high),) = in_world(np.array([[limb.low, limb.high]]), path.heading, at)
-        yield StandingBox(limb_name(limb, line), tuple(low.tolist()), tuple(high.tolist()))
+    for name, (low, high) in LayoutMachines(bare).limbs_at(line.carrier, at):
+        yield StandingBox(limb_name(name, line), tuple(low.tolist()), tuple(high.tolist()))
 
 
 def _feeder_of(cell: Arrangement, carrier: int, bare: Layout) -> Iterator[StandingBox]:
     """What stands of a carrier's feeder."""
     first = cell.factory.first(carrier).label
-    feeder = feeder_of(bare, first)
+    feeder = LayoutMachines(bare).feeder(first)
     for name, box, bottom in (
         ("post", feeder.post, 0.0),
         ("boom", feeder.boom, feeder.low),

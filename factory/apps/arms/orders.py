@@ -5,17 +5,13 @@ that are theirs alone, and the order places that are asked for where they are no
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from factory.api import Diagnostic, Layout, Operation, RunError
+from factory.api import Diagnostic, Layout, LayoutMachines, Operation, Past, RunError
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.planning import ArmPlanner, ArmTour
 from factory.apps.arms.sharing import SweptArm, clear_share
-from factory.floor.layout.certificate import Exclusions, Precedence
-from factory.floor.layout.coordinating import with_machines
-from factory.theory.nets.coordinated import Past
-from factory.theory.problem.ids import OperationId, RobotId, carriage_axis
 
 BEYOND = 0.001
 """How much further than it must an arm has gone where it counts as away [m]."""
@@ -69,12 +65,12 @@ class Away:
 
     Attributes:
         past: the pass by which it has.
-        start: the operation (index) that waits.
+        start: the operation that waits.
         tokens: how much more often it may have started.
     """
 
     past: Past
-    start: OperationId
+    start: Operation
     tokens: int
 
 
@@ -91,7 +87,7 @@ def orders_of(
 
     def gone(join: Operation, at: float) -> Past:
         arm, tour = of[brought[join.index]]
-        return Past(join.end, carriage_axis(RobotId(arm)), round(tour.stop + at + BEYOND, 6))
+        return Past.of_carriage(join.end, arm, round(tour.stop + at + BEYOND, 6))
 
     for before, after in zip([joins[-1], *joins[:-1]], joins, strict=True):
         (one, left), (other, _) = (of[brought[o.index]] for o in (before, after))
@@ -99,14 +95,14 @@ def orders_of(
             leaves = private[left.label].leaves
             if cell.lines[after.carrier].steps:  # the carrier goes on under it
                 leaves = max(leaves, next_tour(tours[one], left.label).goes.off)
-            yield Away(gone(before, leaves), after.index, int(after is joins[0]))
+            yield Away(gone(before, leaves), after, int(after is joins[0]))
     for carrier in cell.lines:
         gear = [factory.operations[number] for number in factory.robots[carrier].operations]
         for join, then in pairwise(gear):
             if join.index in brought and then.index not in brought and then.carrier == carrier:
                 arm, tour = of[brought[join.index]]
                 off = next_tour(tours[arm], tour.label).goes.off
-                yield Away(gone(join, off), then.index, 0)
+                yield Away(gone(join, off), then, 0)
 
 
 def orders_at_sources(
@@ -120,39 +116,29 @@ def orders_at_sources(
             burden = cell.burdens[tour.label]
             if burden.source is not None and burden.source not in alone:
                 at = tour.stop + tour.brings.length - tour.brings.off - BEYOND
-                past = Past(burden.join.start, carriage_axis(RobotId(arm)), round(at, 6), -1)
-                yield Away(past, cell.factory.first(burden.source).index, 1)
+                past = Past.of_carriage(burden.join.start, arm, round(at, 6), -1)
+                yield Away(past, cell.factory.first(burden.source), 1)
 
 
-def exclusions_of(
+def with_orders(
     layout: Layout,
     asked: Sequence[Away],
     tours: Mapping[int, Sequence[ArmTour]],
     alone: Mapping[int, float],
-) -> Exclusions:
-    """The passes and order places that are asked for; arms go by themselves to over their next
-    feeders, carriers to where they are `alone` [m]. Raises RunError (Layout) where the net with
-    them is not live."""
+) -> Layout:
+    """The layout whose certificate has the passes and order places that are asked for; arms go by
+    themselves to over their next feeders, carriers to where they are `alone` [m]. Raises RunError
+    (Layout) where the net with them is not live."""
+    assert layout.certificate is not None
     backs = {**alone}
     for arm, each in tours.items():
         backs[arm] = round(min(t.begins + t.goes.hover for t in each), 6)
-    passes = tuple(dict.fromkeys(away.past for away in asked))
-    net, operations = with_machines(layout, passes), layout.factory.operations
-    event = {past: net.net.right[place] for past, (place, _) in net.passes.items()}
-    called = [transition.name for transition in net.net.net.transitions]
-    orders = tuple(
-        Precedence(
-            f"order:{called[event[away.past]]}:{operations[away.start].label}",
-            called[event[away.past]],
-            called[operations[away.start].start],
-            away.tokens,
-        )
-        for away in asked
-    )
-    if with_machines(layout, passes, orders).deadlock:
+    orders = [(away.past, away.start, away.tokens) for away in asked]
+    apart = LayoutMachines(layout).kept_apart(orders, backs)
+    if apart.faults:
         message = "the arms wait for each other for ever"
         raise RunError(Diagnostic("Layout", message, None, "one arm: --arm NAME"))
-    return Exclusions(passes=passes, orders=orders, backs=tuple(backs.items()))
+    return replace(layout, certificate=replace(layout.certificate, apart=apart))
 
 
 def next_tour(tours: Sequence[ArmTour], label: str) -> ArmTour:

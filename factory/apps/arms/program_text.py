@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Layout, names
+from factory.api import Factory, Layout, Order, names
 from factory.apps.arms.joint_table import JointLeg, legs_of
-from factory.theory.nets.coordinated import Order
 
 VIA = 3
 """Number of places between the straight ends of a leg that are told."""

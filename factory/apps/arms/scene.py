@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from factory.api import WeldFrames
 from factory.apps.arms.model import ArmModel
-from factory.engine.mjcf.weld_frames import joints_of
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 
@@ -113,7 +113,7 @@ class Scene:
     @cached_property
     def _depth(self) -> list[int]:
         """Number of joints that move each geom."""
-        return [len(joints_of(self.m, int(body))) for body in self.m.geom_bodyid]
+        return [len(WeldFrames.joints_of(self.m, int(body))) for body in self.m.geom_bodyid]
 
     def move(self, names: Collection[str], by: tuple[float, float, float]) -> None:
         """Move obstacles from where they stood first [m]."""

@@ -6,11 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.api import Layout
+from factory.api import Layout, LayoutMachines
 from factory.apps.arms.arrangement import Arrangement
 from factory.apps.arms.lines import Line
 from factory.apps.arms.obstacles import feeder_name, limb_name, placed_name
-from factory.floor.layout.hands.limbs import limbs
 
 TOUCHING = "pad", "jaw"
 """What the limbs of a hand are called that touch what it holds."""
@@ -41,8 +40,8 @@ class Spared:
 
     def hand(self, line: Line, but: tuple[str, ...] = ()) -> set[str]:
         """The limbs of the hand of a line's carrier, `but` those of some names."""
-        every = limbs(self.bare, line.carrier)
-        return {limb_name(limb, line) for limb in every if not limb.name.endswith(but)}
+        every = LayoutMachines(self.bare).limbs(line.carrier)
+        return {limb_name(limb.name, line) for limb in every if not limb.name.endswith(but)}
 
     def at(self, label: str, loaded: bool = False) -> set[str]:
         """Where the tool takes something: its feeder, or the carrier that it is on with the part

@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from factory.api import MujocoWorld
-from factory.engine.simulation.mujoco.drives import INPUTS
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
 
@@ -91,7 +90,7 @@ class Interference:
 
     def off(self, axis: int) -> float:
         """Deviation of an axis from its setpoint [m]."""
-        setpoint = self._d.ctrl.reshape(-1, INPUTS)[self._actuator[axis], 0]
+        setpoint = self._d.ctrl.reshape(-1, MujocoWorld.INPUTS)[self._actuator[axis], 0]
         return float(self._d.qpos[self._axes.qpos[axis]] - setpoint)
 
     def greatest_force(self, axis: int) -> float:
@@ -130,7 +129,7 @@ class Interference:
 
     def _setpoint(self, axis: int) -> Array:
         """What a drive reads in this step: position [m], speed [m/s], force [N]."""
-        m, d, read = self._m, self._d, np.zeros((INPUTS, 1))
+        m, d, read = self._m, self._d, np.zeros((MujocoWorld.INPUTS, 1))
         return np.asarray(mujoco.mj_readCtrl(m, d, self._actuator[axis], d.time, read, -1))
 
     def _measure(self) -> None:

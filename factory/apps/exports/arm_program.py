@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.api import coordinated
+from factory.api import LayoutMachines
 from factory.apps.arms.program_text import program_text
 from factory.apps.exports.joints import of_arms
 from factory.apps.exports.subject import Subject
@@ -19,5 +19,5 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
         subject,
         FORMAT,
         "program.txt",
-        lambda layout, arm: program_text(layout, arm, coordinated(layout).orders),
+        lambda layout, arm: program_text(layout, arm, LayoutMachines(layout).coordinated.orders),
     )

@@ -9,12 +9,12 @@ from pathlib import Path
 
 from factory.api import (
     Certificate,
+    LayoutMachines,
     Model,
     Project,
     RunError,
+    Timing,
     Verdict,
-    certify,
-    coordinated,
     physical_model,
 )
 from factory.apps.drawing.tables import titled
@@ -30,7 +30,6 @@ from factory.apps.exports.stock import model_files, written
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
-from factory.floor.modes.modes import operation_modes
 from factory.support.files import own_names, write_all
 from factory.theory.plant.programs import Program
 
@@ -62,7 +61,9 @@ DOCUMENTS: Mapping[str, Callable[[_Drawn], str]] = {
     "clearance.json": lambda what: _json(what.clearance.as_json()),
     "dot": lambda what: write_dot(what.project.layout.factory.net),
     "pnml": lambda what: write_pnml(what.project.layout.factory.net),
-    "coordinated.pnml": lambda what: write_pnml(coordinated(what.project.layout).net),
+    "coordinated.pnml": lambda what: write_pnml(
+        LayoutMachines(what.project.layout).coordinated.net
+    ),
     "goals.json": lambda what: _json(goals(what.model)),
     "ways.json": lambda what: _json(ways(what.model)),
 }
@@ -131,8 +132,8 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     would be written through a link, or over what was read. Nothing is written then."""
     request.claim(project.name)
     layout, settings, output = project.layout, project.settings, request.output
-    operation_modes(layout, settings.eps)
-    clearance = layout.certificate or certify(layout)
+    _ = Timing(layout, settings).modes
+    clearance = layout.certificate or LayoutMachines(layout).certify()
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
     model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import Layout, names, start_positions
+from factory.api import Layout, LayoutMachines, names
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco
@@ -35,7 +35,7 @@ def joints_at_rest(layout: Layout) -> list[JointRest]:
     if layout.chains is None:
         return []
     chains, factory = layout.chains, layout.factory
-    at = start_positions(layout, factory.net.initial_marking)
+    at = LayoutMachines(layout).starts(factory.net.initial_marking)
     made = list[JointRest]()
     for robot in chains.robots:
         row = np.array([chains.row(factory.first(robot).index, robot)])

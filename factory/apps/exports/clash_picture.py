@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Product
+from factory.api import Matings, Product
 from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import (
     EDGE,
@@ -18,7 +18,7 @@ from factory.apps.exports.product_view import (
     bodies_of,
     picture_names,
 )
-from factory.floor.mating.findings import Mating, Matings
+from factory.floor.mating.findings import Mating
 
 TOP = 150.0
 """Upper edge of the views."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.api import PAG, GearNet, MarkedNet, marked
+from factory.api import PAG, GearNet, MarkedNet
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.svg import pag_of, view_of
 from factory.apps.exports.swimlanes import colour
@@ -23,7 +23,7 @@ def write_dot(net: GearNet | MarkedNet) -> str:
 
     Arcs have the colour of the robot whose gear they belong to; a place with tokens shows them.
     """
-    return "\n".join(_lines(marked(net))) + "\n"
+    return "\n".join(_lines(MarkedNet.of(net))) + "\n"
 
 
 def write_tree(pag: PAG) -> str:

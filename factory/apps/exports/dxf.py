@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from factory.api import Layout
+from factory.api import Layout, LayoutMachines
 from factory.apps.exports.floor_plan import Flat, flat_shapes, stations
 from factory.apps.exports.subject import Subject
-from factory.floor.layout.feeding import feeder_of
 from factory.support.boxes import Box, Point2
 from factory.support.version import optional
 
@@ -103,7 +102,7 @@ def _shape(space: Any, shape: Flat) -> None:
 def _labels(layout: Layout) -> Iterator[tuple[str, Point2]]:
     """Labels: parts at their feeders, robots on their carriages, operations at their junctions."""
     for leaf in layout.factory.leaves:
-        xlo, _, _, yhi = feeder_of(layout, leaf.label).post
+        xlo, _, _, yhi = LayoutMachines(layout).feeder(leaf.label).post
         yield leaf.label, (xlo, yhi + 0.005)
     for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
         (x, y), wide = path.carriage(path.length), layout.factory.carriage

@@ -8,13 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from factory.api import Layout, Solid, regions
+from factory.api import Dimensions, Ground, Layout, LayoutMachines, Solid
 from factory.apps.drawing.canvas import hexadecimal, hull
-from factory.floor.layout.feeding import feeder_of
-from factory.floor.layout.hands.limbs import limbs
-from factory.floor.layout.tiles import tiles_of
 from factory.support.boxes import Box, Extent, Point2
-from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 JUNCTION = 0.008
 """Radius of the circle at a junction [m]."""
@@ -54,14 +50,14 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
     carriages go) and `last` (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot`
     or `tool`) of robots at home, `part`, `junction`."""
     yield Flat.of_box("floor", layout.floor)
-    yield from (Flat.of_box("tile", tile) for tile in tiles_of(layout))
+    yield from (Flat.of_box("tile", tile) for tile in Ground.tiles(layout))
     yield from _sweeps(layout)
     yield Flat.of_box("belt", layout.outfeed)
     leaves = layout.factory.leaves
     for leaf in leaves:
         yield part_outline(layout, leaf.label, layout.guidepaths[0].a, "product")
     for leaf in leaves:
-        feeder = feeder_of(layout, leaf.label)
+        feeder = LayoutMachines(layout).feeder(leaf.label)
         for style, box in (
             ("boom", feeder.boom),
             ("post", feeder.post),
@@ -110,7 +106,7 @@ def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
 
 def _sweeps(layout: Layout) -> Iterator[Flat]:
     """Regions swept by payloads: the coupled ones first, so that those of every mode lie on top."""
-    payloads = [region for region in regions(layout) if region.is_payload]
+    payloads = [region for region in LayoutMachines(layout).regions if region.is_payload]
     for style in ("coupled", "uncoupled"):
         boxes = (r.box for r in payloads if r.is_coupled == (style == "coupled"))
         yield from (Flat.of_box(style, box) for box in dict.fromkeys(boxes))
@@ -119,11 +115,11 @@ def _sweeps(layout: Layout) -> Iterator[Flat]:
 def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
     path = layout.guidepaths[robot]
     half, rim, foot = layout.factory.carriage / 2, path.reach - path.arm, path.carriage(path.length)
-    for limb in limbs(layout, robot):
+    for limb in LayoutMachines(layout).limbs(robot):
         sides = sorted((limb.low[1] * path.left, limb.high[1] * path.left))
         box: Extent = (limb.low[0], limb.high[0], sides[0], sides[1])
         yield Flat.of_box("finger", path.world(box, foot))
-    arm: Extent = (0.0, rim, -ARM_WIDTH / 2, ARM_WIDTH / 2)
+    arm: Extent = (0.0, rim, -Dimensions.ARM_WIDTH / 2, Dimensions.ARM_WIDTH / 2)
     yield Flat.of_box("arm", path.world(arm, foot))
     carriage = Flat.of_box(style, path.world((-half, half, -half, half), foot))
     yield replace(carriage, name=layout.factory.robots[robot].name)

@@ -7,10 +7,9 @@ from math import dist, floor, sqrt
 
 import numpy as np
 
-from factory.api import Layout
+from factory.api import Layout, LayoutMachines
 from factory.apps.drawing.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
 from factory.apps.exports.floor_plan import Flat, flat_shapes, stations
-from factory.floor.layout.feeding import feeder_of
 
 FONT = 17.0
 """Size of a label on the floor [mm]."""
@@ -208,7 +207,7 @@ class FloorSheet:
             for label in labels:
                 self.canvas.place(millimetres(at), label, FONT, 8.0, "j")
         for leaf in layout.factory.leaves:
-            xlo, xhi, ylo, yhi = feeder_of(layout, leaf.label).post
+            xlo, xhi, ylo, yhi = LayoutMachines(layout).feeder(leaf.label).post
             middle = millimetres(((xlo + xhi) / 2, (ylo + yhi) / 2))
             self.canvas.place(middle, leaf.label, FONT, 19.0, "p")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN, Diagnostic, InputError, Mesh, names, physical_model
+from factory.api import Diagnostic, InputError, Mesh, Model, names, physical_model
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.apps.exports.gltf import new_scene, pose, shaded, written
 from factory.apps.exports.subject import Subject
@@ -79,7 +79,7 @@ def write_factory(replica: Replica, binary: bool) -> bytes:
     geoms: list[int] = []
     meshes: dict[tuple[object, ...], str] = {}
     for body in range(m.nbody):
-        if body and (d.xpos[body, 2] < HIDDEN or m.body(body).name == names.COMPASS):
+        if body and (d.xpos[body, 2] < Model.HIDDEN or m.body(body).name == names.COMPASS):
             continue
         node = _node(replica, body)
         if body:

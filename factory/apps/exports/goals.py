@@ -6,9 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from factory.api import NOPART, Model, Operation, names
+from factory.api import NOPART, Model, Operation, Timing, names
 from factory.apps.exports.stock import scales_of
-from factory.floor.modes.modes import operation_modes
 
 Json = dict[str, Any]
 
@@ -20,7 +19,7 @@ def goals(model: Model) -> Json:
     goals of actuators [m; rad of tools that turn], and the welds that go on and off at its end.
     """
     layout, settings = model.layout, model.settings
-    modes, scales = operation_modes(layout, settings.eps), scales_of(layout)
+    modes, scales = Timing(layout, settings).modes, scales_of(layout)
     robots = layout.factory.robots
 
     def places(operation: Operation) -> Iterator[tuple[str, float]]:

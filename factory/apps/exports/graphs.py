@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from factory.api import PAG, Factory, GearNet, MarkedNet, marked
+from factory.api import PAG, Factory, GearNet, MarkedNet
 from factory.support.errors import Position
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def to_networkx(subject: PAG | Factory | GearNet | MarkedNet) -> nx.DiGraph:
     """
     if isinstance(subject, PAG):
         return _tree(subject)
-    return _net(marked(subject.net if isinstance(subject, Factory) else subject))
+    return _net(MarkedNet.of(subject.net if isinstance(subject, Factory) else subject))
 
 
 def _tree(pag: PAG) -> nx.DiGraph:

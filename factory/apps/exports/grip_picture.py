@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Product
+from factory.api import NoGrip, Product
 from factory.apps.drawing.canvas import shortened
 from factory.apps.exports.product_view import EDGE, ROW, PartView, ViewSheet, picture_names
-from factory.floor.layout.hands.misses import Miss, NoGrip
+from factory.floor.layout.hands.misses import Miss
 from factory.support.arrays import Array
 
 HEAD, GAP, INDENT = 92.0, 108.0, 150.0

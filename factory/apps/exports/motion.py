@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.api import HIDDEN
+from factory.api import Model
 from factory.apps.log import Log
 from factory.support.arrays import Array, Indices, Truth
 
@@ -57,7 +57,7 @@ class BodyMotion:
 
     def unseen(self) -> Truth:
         """Whether a body is invisible in a frame (n, bodies): a spare one below the floor."""
-        return np.asarray(self.position[:, :, 2] < HIDDEN)
+        return np.asarray(self.position[:, :, 2] < Model.HIDDEN)
 
 
 def motion_of(log: Log) -> BodyMotion:

@@ -10,13 +10,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from factory.api import Gear, GearNet, MarkedNet, Place, Project, Transition, coordinated, marked
+from factory.api import Gear, GearNet, LayoutMachines, MarkedNet, Place, Project, Transition
 from factory.apps.drawing.markup import escape, quoteattr
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import Swimlanes, swimlanes
 from factory.support.boxes import Point2
 from factory.support.errors import Position
-from factory.theory.nets.threaded import Redistribution
 
 FORMAT, TAKES = "pnml", "net"
 OF = "net or, of a PAG, coordinated"
@@ -30,6 +29,9 @@ BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
 ROUND, BAR = (24.0, 24.0), 6.0
 """Size of a place, width of a transition's bar."""
 
+Moves = tuple[tuple[tuple[int, int], tuple[int, int]], ...]
+"""From which slot of a place to which robots go as a transition fires."""
+
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -39,7 +41,7 @@ def export(subject: Subject) -> str:
     wanted = ["net", "coordinated"] if isinstance(subject.source, Project) else ["net"]
     if subject.choose(wanted, "choices") == "net":
         return write_pnml(subject.net)
-    return write_pnml(coordinated(subject.project.layout).net)
+    return write_pnml(LayoutMachines(subject.project.layout).coordinated.net)
 
 
 def write_pnml(net: GearNet | MarkedNet) -> str:
@@ -48,11 +50,9 @@ def write_pnml(net: GearNet | MarkedNet) -> str:
 
 
 def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     at = swimlanes(subject)
-    moves: tuple[Redistribution, ...] = ()
-    if isinstance(net, GearNet):
-        moves = net.threaded.redistribution
+    moves = net.threaded.redistribution if isinstance(net, GearNet) else ()
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f"<pnml xmlns={quoteattr(PNML)}>"
     yield f'<net id="net" type={quoteattr(NET_TYPE)}>'
@@ -127,7 +127,7 @@ def _place(net: MarkedNet, index: int, place: Place, at: Swimlanes) -> Iterator[
 
 
 def _transition(
-    index: int, transition: Transition, moves: Redistribution | None, graphics: str
+    index: int, transition: Transition, moves: Moves | None, graphics: str
 ) -> Iterator[str]:
     content = []
     if moves is not None:

@@ -18,7 +18,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.api import Layout, Model, names, start_positions
+from factory.api import Layout, LayoutMachines, Model, names
 from factory.apps.drawing.markup import quoteattr
 from factory.apps.exports.chain_rest import joints_at_rest, key_values
 from factory.support.xml_writer import add, number, numbers
@@ -80,7 +80,7 @@ class Scale:
 
 def scales_of(layout: Layout) -> dict[str, Scale]:
     """Those of carriages and lifts, which are 0 at the start of a run, by the names of joints."""
-    at = start_positions(layout, layout.factory.net.initial_marking).tolist()
+    at = LayoutMachines(layout).starts(layout.factory.net.initial_marking).tolist()
     scales = {
         names.joint(axis): Scale(at[axis.index], 1.0 if axis.motion.hangs else -1.0)
         for axis in layout.factory.axes

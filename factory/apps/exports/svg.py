@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, marked
+from factory.api import PAG, Assembly, Diagnostic, InputError, MarkedNet, Project, Solid
 from factory.apps.drawing.canvas import LETTER, Canvas, Point, hexadecimal, shortened
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.swimlanes import COLOURS, LEFT, SHARED, apart, swimlanes
-from factory.floor.geometry.solids import colour
 
 RADIUS, HEAD = 12.0, (8.0, 3.5)
 """Radius of a place; length and half width of an arrowhead."""
@@ -156,7 +155,7 @@ def export(subject: Subject) -> str:
     """The net or the assembly tree as a drawing."""
     if view_of(subject) == "tree":
         return draw_tree(pag_of(subject))
-    return draw_net(marked(subject.net), subject.stem)
+    return draw_net(MarkedNet.of(subject.net), subject.stem)
 
 
 def draw_net(net: MarkedNet, title: str) -> str:
@@ -217,7 +216,7 @@ def draw_tree(pag: PAG) -> str:
         x, y = at[node.label]
         _box(canvas, (x, y), node)
         if not node.inputs:
-            left, paint = x - BOX / 2 + 5, hexadecimal(colour(node, parts))
+            left, paint = x - BOX / 2 + 5, hexadecimal(Solid.colour_of(node, parts))
             canvas.rectangle((left, left + 12, y - 6, y + 6), "", 2.0, fill=paint)
             parts += 1
     width = max(x for x, _ in at.values()) + BOX / 2 + MARGIN

@@ -16,7 +16,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 
-from factory.api import MarkedNet, token_free
+from factory.api import MarkedNet
 from factory.apps.drawing.canvas import Point
 
 COLOURS = (
@@ -126,7 +126,7 @@ def _columns(net: MarkedNet) -> list[int]:
     """For each transition the length of the longest token-free path to it; 0 on a token-free
     circuit."""
     columns = [0] * len(net.net.transitions)
-    for event in token_free(net).order:
+    for event in net.token_free.order:
         for place in net.net.postset[event]:
             if not net.tokens[place]:
                 for after in net.net.places[place].right:

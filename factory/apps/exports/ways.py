@@ -12,11 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from factory.api import Model, coordinated, names
+from factory.api import LayoutMachines, Model, names
 from factory.apps.exports.stock import Scale, scales_of
-from factory.floor.layout.exclusions import awaited_positions
-from factory.floor.layout.hanging import Hanging
-from factory.floor.layout.machines import presences
 from factory.floor.layout.presence import Presence
 
 Json = dict[str, Any]
@@ -28,13 +25,12 @@ Span = tuple[float, float]
 def ways(model: Model) -> Json:
     """The places of a model's coordinated net, each from one transition to another with its
     tokens, and the ways of its machines [m]."""
-    layout = model.layout
-    coordination = coordinated(layout)
-    net, written = coordination.net, _Writer(model)
+    machines = LayoutMachines(model.layout)
+    net, written = machines.coordinated.net, _Writer(model)
     events = net.net.transitions
     moving = [
         (one, [net.net.places[p].name for p in one.places])
-        for one in presences(layout, coordination, awaited_positions(layout))
+        for one in machines.presences
         if one.places
     ]
     return {
@@ -53,7 +49,7 @@ class _Writer:
     """Writes the presences of machines with the names of a model."""
 
     def __init__(self, model: Model) -> None:
-        self._model, self._hanging = model, Hanging.of(model.layout)
+        self._model, self._hanging = model, LayoutMachines(model.layout).sliders
         self._scales = scales_of(model.layout)
 
     def way(self, one: Presence) -> Json:

@@ -15,9 +15,8 @@ from itertools import pairwise
 from math import inf
 from typing import Literal
 
-from factory.api import NOPART, PAG, Factory, Template, expand
+from factory.api import NOPART, PAG, Factory, Node, Settings, Template
 from factory.apps.few_robots.parallel import Branches
-from factory.support.bounds import check_values
 
 SHOWN = 6
 """Number of labels of a proof that are shown."""
@@ -61,7 +60,7 @@ Joins = Mapping[str, tuple[Template, Sequence[str]]]
 def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     """The bound for a product; for a mix, of the product that needs most, with the tools of all.
     Linear."""
-    nodes = expand(pag, templates).values()
+    nodes = Node.expand(pag, templates).values()
     return _least({n.label: (n.template, n.inputs) for n in nodes}, pag.products)
 
 
@@ -128,7 +127,7 @@ class Aim:
     def __post_init__(self) -> None:
         robots = None if self.robots == "least" else self.robots
         seconds = None if self.seconds == inf else self.seconds
-        check_values(
+        Settings.check_values(
             {"robots": robots, "cycle": self.cycle, "effort": self.effort, "seconds": seconds}
         )
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
-from factory.api import Factory, Operation, Pace, Plan, Product, Project, expand, payload_boxes
+from factory.api import Factory, LayoutSearch, Node, NoGrip, Operation, Pace, Plan, Product, Project
 from factory.apps.few_robots.aim import STEP
 from factory.apps.few_robots.bundles import Filling
 from factory.apps.few_robots.candidate import Candidate
@@ -15,7 +15,6 @@ from factory.apps.few_robots.folding import Line
 from factory.apps.few_robots.forms import FormsTask, Order, best_forms, written_forms
 from factory.apps.few_robots.lines import SLACKS, Shift, admitted
 from factory.apps.few_robots.parallel import Branches
-from factory.floor.layout.hands.misses import NoGrip
 from factory.support.allowance import Allowance
 from factory.support.boxes import Box
 
@@ -232,13 +231,13 @@ class Estimator:
 
 def _task(project: Project) -> FormsTask:
     pag, templates, product = project.pag, project.templates, project.product
-    admits = admitted(expand(pag, templates), product) if pag.is_shaped else {}
-    boxes = payload_boxes(project.compiled, product)
+    admits = admitted(Node.expand(pag, templates), product) if pag.is_shaped else {}
+    boxes = LayoutSearch(project.compiled, product).payloads
     return FormsTask(pag, templates, admits, boxes, Pace.of(project.settings))
 
 
-def _boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    return payload_boxes(factory, product.repeated(factory))
+def _boxes(factory: Factory, product: Product) -> Mapping[str, Box]:
+    return LayoutSearch(factory, product.repeated(factory)).payloads
 
 
 def blamed(project: Project, forms: Mapping[str, int]) -> Iterator[tuple[str, int]]:

@@ -18,9 +18,8 @@ from functools import cached_property
 from math import inf
 from typing import Literal
 
-from factory.api import PAG, Assembly, Node, Pace, Plan, Template, expand
+from factory.api import PAG, Assembly, Matings, Node, Pace, Plan, Template
 from factory.apps.few_robots.lines import Admitted
-from factory.floor.mating.findings import Level
 from factory.support.boxes import Box
 
 APART = 0.06
@@ -81,7 +80,7 @@ class FormsTask:
     @cached_property
     def nodes(self) -> Mapping[str, Node]:
         """Its operations, in postorder."""
-        return expand(self.pag, self.templates)
+        return Node.expand(self.pag, self.templates)
 
     def size(self, label: str) -> float:
         """Length of the longer side of a sub-assembly on the floor [m]."""
@@ -227,7 +226,7 @@ def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int
     if len(node.inputs) > 2:
         lowers = lowers[-1:]
     level = max(admits.slides[axis], *lowers)
-    return int(level == Level.BLOCKED), int(level < Level.NO_DEEPER)
+    return int(level == Matings.LEVEL.BLOCKED), int(level < Matings.LEVEL.NO_DEEPER)
 
 
 def joins(node: Assembly) -> Iterator[str]:

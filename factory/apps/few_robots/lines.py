@@ -12,10 +12,9 @@ from math import inf
 
 import numpy as np
 
-from factory.api import Catalogue, Factory, Finder, Node, Pace, Plan, Product, marked
+from factory.api import Catalogue, Factory, Finder, MarkedNet, Matings, Node, Pace, Plan, Product
 from factory.apps.few_robots.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 from factory.apps.few_robots.folding import Line, count_of, fold, folded
-from factory.floor.mating.findings import Level
 from factory.support.allowance import Allowance
 from factory.support.boxes import Box
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
@@ -56,7 +55,7 @@ class Shift:
             return max(self.work) / self.timing.factory.period
         made = folded(self.timing.factory, lines, self.catalogue)
         delays = estimated_delays(replace(self.timing, factory=made))
-        net = marked(made.net)
+        net = MarkedNet.of(made.net)
         idle = [0.0] * (len(net.tokens) - len(delays))
         return max_cycle_ratio(net, [*delays, *idle]).seconds / made.period
 
@@ -169,8 +168,8 @@ class Admitted:
     """The best levels (`findings`) of one operation: its inputs `slides` along x and y from the
     better side; the first, or the last of them is lowered (`lowers`)."""
 
-    slides: tuple[int, int] = (Level.STRICT, Level.STRICT)
-    lowers: tuple[int, int] = (Level.STRICT, Level.STRICT)
+    slides: tuple[int, int] = (Matings.LEVEL.STRICT, Matings.LEVEL.STRICT)
+    lowers: tuple[int, int] = (Matings.LEVEL.STRICT, Matings.LEVEL.STRICT)
 
 
 def admitted(nodes: Mapping[str, Node], product: Product) -> Mapping[str, Admitted]:

@@ -20,10 +20,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import accumulate
 from math import lcm
 
-from factory.api import NOPART, Diagnostic, Factory, InputError, Plan
+from factory.api import NOPART, Diagnostic, Factory, InputError, Plan, Settings
 from factory.apps.few_robots.tees import ROOM
 from factory.support.errors import Position, did_you_mean
-from factory.support.settings import MOST_BRANCHES
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
@@ -41,9 +40,10 @@ def in_parallel(factory: Factory, branches: Branches) -> Plan:
         above = lines[factory.last(robot.index).carrier] if lines else 1
         lines.append(above * times.get(robot.index, 1))
     period = lcm(*lines)
-    if (units := period * factory.period) > MOST_BRANCHES:
+    most = Settings.MOST_BRANCHES
+    if (units := period * factory.period) > most:
         names = ", ".join(f"{label} = {k}" for label, k in branches)
-        message = f"{names} would make {units} units in one period; {MOST_BRANCHES} are the most"
+        message = f"{names} would make {units} units in one period; {most} are the most"
         raise InputError(_fault(message, None, "take numbers with a small common multiple"))
     if period == 1:
         return factory.plan

@@ -12,6 +12,7 @@ from factory.api import (
     Diagnostic,
     Factory,
     Layout,
+    Model,
     Run,
     RunError,
     RunRequest,
@@ -24,7 +25,6 @@ from factory.apps.analyze.timed import steady_units
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.fidelity.record import QUANTITIES, Fidelity, SeedRecord
 from factory.apps.sweep.workers import over_workers
-from factory.engine.mjcf.model import product_name
 from factory.support.engine import mujoco
 
 WORST = 10
@@ -64,7 +64,7 @@ def measure(
     case = Case(layout, units, jitter, settings or Settings(), max_time)
     records = over_cases([(case, seed) for seed in seeds], jobs, done, on)
     factory = layout.factory
-    return Fidelity(product_name(factory), len(factory.robots), jitter, tuple(records))
+    return Fidelity(Model.product_name(factory), len(factory.robots), jitter, tuple(records))
 
 
 def over_cases(

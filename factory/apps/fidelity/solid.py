@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import HIDDEN, Replica, names
-from factory.engine.mjcf.replica import SHOWN
+from factory.api import Geoms, Model, Replica, names
 from factory.support.arrays import Array, Index, Truth
 from factory.support.engine import mujoco
 
@@ -34,7 +33,7 @@ class SolidReplica(Replica):
         pair at least movable, and how deep (n,) one is inside the other [m]."""
         m, d = self.m, self.d
         self.place(qpos)
-        m.body_contype[:] = m.body_conaffinity[:] = self._solid & (d.xpos[:, 2] > HIDDEN)
+        m.body_contype[:] = m.body_conaffinity[:] = self._solid & (d.xpos[:, 2] > Model.HIDDEN)
         mujoco.mj_collision(m, d)
         return d.contact.geom[: d.ncon], -d.contact.dist[: d.ncon]
 
@@ -61,7 +60,7 @@ def drawn(m: mujoco.MjModel) -> Truth:
     body = [names.kind(m.body(int(b)).name) for b in m.geom_bodyid]
     part = np.isin(body, ["part", names.SHELL])
     plane = m.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    return np.asarray(np.where(part, m.geom_group != 1, (m.geom_group < SHOWN) & ~plane))
+    return np.asarray(np.where(part, m.geom_group != 1, (m.geom_group < Geoms.SHOWN) & ~plane))
 
 
 def _overlapping(low: Array, high: Array) -> Index:

@@ -14,16 +14,11 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, GearNet, MarkedNet, Verdict, listing, marked, token_free
+from factory.api import Defect, GearNet, GearProof, MarkedNet, Verdict
 from factory.apps.foreign_nets.discover import discover
 from factory.apps.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.support.collector import collector_paused
-from factory.support.errors import Position
-from factory.theory.nets.composition import Composition
-from factory.theory.nets.marked import stuck_circuit
-from factory.theory.nets.train import no_way_back
-from factory.theory.nets.verdict import Defect
-from factory.theory.nets.verify import legality_defects, shape_defects
+from factory.support.errors import Position, listing
 
 WORK = 5_000_000
 """Greatest number of places visited by the search for an unsafe one."""
@@ -51,14 +46,13 @@ def analyse(
     if isinstance(net, MarkedNet) and not net.gears:
         gears, against = discover(net)
         net = net.with_gears(gears) if gears else net
-    subject, train, closed = marked(net), None, tuple[bool, ...]()
+    subject, train, closed = MarkedNet.of(net), None, tuple[bool, ...]()
     if against:
         illegal: tuple[Defect, ...] = (Defect("legal", "undecided", NO_GEARS),)
     else:
-        composition = Composition.of(subject)
-        closed = composition.closed
-        against, train = shape_defects(net, subject, composition)
-        illegal = legality_defects(net, subject)
+        proof = GearProof.of(net)
+        closed, train = proof.composition.closed, proof.train
+        against, illegal = proof.against, proof.illegal
     if subject.is_marked_graph:
         method, defects = "structure", _of_marked_graph(subject, closed)
     else:
@@ -69,10 +63,10 @@ def analyse(
 def _of_marked_graph(net: MarkedNet, closed: Sequence[bool]) -> Iterator[Defect]:
     """The defects of a marked graph as to live, safe and reversible; `closed`: which of its gears
     are cycles."""
-    stuck = token_free(net).stuck
+    stuck = net.token_free.stuck
     yield from _dying(net, stuck)
     yield from _unsafe(net, closed, frozenset(stuck))
-    if stuck or NONE in net.left or NONE in net.right:
+    if stuck or MarkedNet.NONE in net.left or MarkedNet.NONE in net.right:
         yield from _one_way(net, stuck)
 
 
@@ -80,11 +74,11 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
     """Why a marked graph is not live: a circuit free of tokens, or a place without producer."""
     names = net.net.places
     if stuck:
-        circuit = stuck_circuit(net, stuck)
+        circuit = net.stuck_circuit(stuck)
         events = tuple(net.right[p] for p in circuit)
         shown = listing(names[p].name for p in circuit)
         text, kind = f"the circuit through {shown} carries no token", "token-free circuit"
-        if net.left[circuit[0]] == NONE:
+        if net.left[circuit[0]] == MarkedNet.NONE:
             text, kind = f"nothing ever marks place {shown}", "missing producer"
         elif events[0] in net.blocked:
             text = f"place {shown} is before and after its transition, which is dead (Def. 3.4)"
@@ -105,7 +99,7 @@ def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> It
     covered = net.cover(closed)
     work = 0
     for place, gear in enumerate(covered):
-        if gear != NONE:
+        if gear != MarkedNet.NONE:
             continue
         bound = overfill(net, place, stuck)
         if bound.firings is not None:
@@ -144,7 +138,7 @@ def overfill(net: MarkedNet, place: int, stuck: frozenset[int] = frozenset()) ->
     needed, producer = 2 - net.tokens[place], net.left[place]
     if needed <= 0:
         return Bound({})
-    if producer == NONE:
+    if producer == MarkedNet.NONE:
         return Bound(None)
     left, tokens, preset = net.left, net.tokens, net.net.preset
     distance: dict[int, int] = {}
@@ -163,7 +157,7 @@ def overfill(net: MarkedNet, place: int, stuck: frozenset[int] = frozenset()) ->
             for q in preset[event]:
                 work += 1
                 far = level + tokens[q]
-                if far < needed and left[q] == NONE:
+                if far < needed and left[q] == MarkedNet.NONE:
                     return Bound(None, (), work)
                 if far < needed:
                     levels[far].append((left[q], q))
@@ -214,7 +208,7 @@ def run_down(net: MarkedNet) -> tuple[int, ...] | None:
         firing.append(event)
         net.fire(tokens, event)
         after = [net.right[p] for p in net.net.postset[event]]
-        ready += [event, *(e for e in after if e != NONE and e not in net.blocked)]
+        ready += [event, *(e for e in after if e != MarkedNet.NONE and e not in net.blocked)]
     return tuple(firing)
 
 
@@ -245,7 +239,7 @@ def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defect]:
             finite.update(place.left + place.right)
     ending = {e for part in nx.connected_components(graph) if part & finite for e in part}
     for event in islice((e for e in net.enabled(net.tokens) if e in ending), 1):
-        yield no_way_back(net, event)
+        yield Defect.no_way_back(net, event)
 
 
 def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
@@ -276,5 +270,5 @@ def _explored(net: MarkedNet, exploration: Exploration) -> Iterator[Defect]:
 
 def dead_ends(net: MarkedNet) -> tuple[int, ...]:
     """The places with a consumer but no producer: what they feed stops (marked graphs)."""
-    pairs = enumerate(zip(net.left, net.right, strict=True))
-    return tuple(p for p, (before, after) in pairs if before == NONE and after != NONE)
+    none, pairs = MarkedNet.NONE, enumerate(zip(net.left, net.right, strict=True))
+    return tuple(p for p, (before, after) in pairs if before == none and after != none)

@@ -12,10 +12,8 @@ from itertools import islice
 
 import networkx as nx
 
-from factory.api import NONE, Gear, MarkedNet, listing
-from factory.theory.nets.composition import MOST, notation
-from factory.theory.nets.marked import MANY
-from factory.theory.nets.verdict import Defect
+from factory.api import Defect, Gear, MarkedNet
+from factory.support.errors import listing
 from factory.theory.problem.ids import PlaceId, TransitionId
 
 
@@ -24,7 +22,7 @@ def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
     if not net.net.places:
         return (), (Defect.no_gear_net("no gear", "the net has no places"),)
     shared = _shared(net)
-    against = tuple(islice(_local(net, shared), MOST))
+    against = tuple(islice(_local(net, shared), Defect.MOST))
     if against:
         return (), against
     graph = _contracted(net, shared)
@@ -61,14 +59,14 @@ def _shared(net: MarkedNet) -> frozenset[int]:
 def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Defect]:
     """Places and transitions whose neighbourhood cannot be part of a gear net."""
     for place, (before, after) in enumerate(zip(net.left, net.right, strict=True)):
-        called = f"place {net.net.places[place].name} = {notation(net, place)}"
-        if before == NONE:
+        called = f"place {net.net.places[place].name} = {net.notation(place)}"
+        if before == MarkedNet.NONE:
             yield Defect.no_gear_net("missing producer", f"nothing marks {called}", places=[place])
-        if after == NONE:
+        if after == MarkedNet.NONE:
             yield Defect.no_gear_net(
                 "missing consumer", f"nothing takes from {called}", places=[place]
             )
-        if MANY in (before, after):
+        if MarkedNet.MANY in (before, after):
             text = f"{called} is not of the form [x; y]: the net has choice there"
             yield Defect.no_gear_net("choice", text, places=[place])
         if before == after >= 0:
@@ -105,7 +103,7 @@ def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Defect:
     several."""
     for strong in nx.strongly_connected_components(part):
         if len(strong) == 1 and (place := ~next(iter(strong))) >= 0:
-            called = f"place {net.net.places[place].name} = {notation(net, place)}"
+            called = f"place {net.net.places[place].name} = {net.notation(place)}"
             return Defect.no_gear_net(
                 "unclosed gear", f"{called} lies on no circuit", places=[place]
             )

@@ -12,16 +12,17 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TypeVar
 
-from factory.api import NONE, Gear, GearNet, MarkedNet, PetriNet, Place, Transition, read_text
+from factory.api import Gear, GearNet, GearProof, MarkedNet, PetriNet, Place, Transition, read_text
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
 from factory.support.files import NET
 from factory.support.xml_tree import Element, XmlDocument
-from factory.theory.nets.composition import Composition
-from factory.theory.nets.threaded import Redistribution, ThreadedNet
 from factory.theory.problem.ids import PlaceId, TransitionId
 
 N = TypeVar("N", bound=int)
+Moves = tuple[tuple[tuple[PlaceId, int], tuple[PlaceId, int]], ...]
+"""Which slot of a place goes to which, as an event fires."""
+
 Events = list[TransitionId]
 Numbers = Mapping[str, N]
 
@@ -119,9 +120,9 @@ class _Reader:
         if initial is None or len(redistribution) < len(moves) or not sized:
             return loose
         try:
-            return GearNet(ThreadedNet(net.net, redistribution), gears, initial, slots)
+            return GearNet.of(net.net, redistribution, gears, initial, slots)
         except ValueError as error:
-            if not Composition.of(loose).defects:
+            if not GearProof.of(loose).composition.defects:
                 hint = "name each slot before and after it once, or leave the notes out"
                 self.fault(elements[0], str(error), hint)
                 self.stop()
@@ -300,7 +301,7 @@ def _gear(element: Element, places: Numbers[PlaceId], events: Numbers[Transition
     """A gear; a place that is gone is left out together with the transition before it."""
     notes = element.attributes
     through = [places.get(name, PlaceId(-1)) for name in notes.get("places", "").split()]
-    turns = [events.get(name, NONE) for name in notes.get("transitions", "").split()]
+    turns = [events.get(name, MarkedNet.NONE) for name in notes.get("transitions", "").split()]
     if len(through) == len(turns):
         turns = [e for p, e in zip(through, turns, strict=True) if p >= 0]
     present = tuple(p for p in through if p >= 0)
@@ -324,7 +325,7 @@ def _initial(net: MarkedNet) -> tuple[PlaceId, ...] | None:
     return None if stray or lost else tuple(on[0] for on in marked)
 
 
-def _redistribution(event: Element, places: Mapping[str, PlaceId]) -> Redistribution | None:
+def _redistribution(event: Element, places: Mapping[str, PlaceId]) -> Moves | None:
     """d_e of an event, None where it is missing or names what is not there."""
     note = next(_notes(event, "redistribution"), None)
     if note is None:

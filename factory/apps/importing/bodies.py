@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError
+from factory.api import Diagnostic, InputError, Solid
 from factory.apps.importing.zipping import zipped
-from factory.floor.geometry.pieces import MOST_PIECES
 from factory.support.arrays import Array, Indices
 from factory.support.decimals import UNITS as LENGTHS
 from factory.support.meshes.bodies import bodies as shells
@@ -143,7 +142,7 @@ def solids_of(body: FileBody) -> tuple[FileBody, ...]:
     count = int(number.max()) + 1
     volume = np.array([volume_of(vertices, faces[number == n]) for n in range(count)])
     outer = np.flatnonzero(volume > 0)
-    if len(outer) < 2 or count > MOST_PIECES:
+    if len(outer) < 2 or count > Solid.MOST_PIECES:
         whole = replace(body, mesh=MeshFile(((vertices, faces),)), colours=())
         return (body if faces is drawn else whole,)
     boxes = np.array([_box(vertices[faces[number == n]].reshape(-1, 3)) for n in range(count)])

@@ -10,12 +10,19 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Parameter, Product
-from factory.floor.geometry.overlapping import overlaps_of
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    Diagnostic,
+    DrawnSolids,
+    InputError,
+    Parameter,
+    Product,
+)
 from factory.support.errors import Position
 from factory.support.texts import where
 from factory.theory.lang.words import is_label
-from factory.theory.problem.pag import RESERVED, AllowedOverlap
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""
@@ -77,10 +84,10 @@ def label_of(name: str) -> str:
     >>> label_of("Left wing (2x4).ldr")
     'Left-wing-2x4-.ldr'
     """
-    if is_label(name) and name not in RESERVED and not _FOREIGN.search(name):
+    if is_label(name) and name not in PAG.RESERVED and not _FOREIGN.search(name):
         return name[:_LONGEST]
     label = _FOREIGN.sub("-", name)[:_LONGEST].strip("-.")
-    return f"{label}-" if label in RESERVED else label
+    return f"{label}-" if label in PAG.RESERVED else label
 
 
 def file_stem(name: str) -> str:
@@ -234,5 +241,5 @@ EVERYWHERE = 5e-4
 def everywhere(product: Product) -> tuple[AllowedOverlap, ...]:
     """The allowance for a drawing without fits, such as an LDraw model: any two parts may overlap
     by up to 0.5 mm. Empty if no overlap needs it."""
-    needed = any(pair.depth <= EVERYWHERE for pair in overlaps_of(product).pairs)
+    needed = any(pair.depth <= EVERYWHERE for pair in DrawnSolids.overlaps(product).pairs)
     return (AllowedOverlap(EVERYWHERE),) if needed else ()

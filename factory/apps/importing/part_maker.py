@@ -10,7 +10,7 @@ from warnings import catch_warnings
 
 import numpy as np
 
-from factory.api import Parameter, Value
+from factory.api import PAG, Parameter, Value
 from factory.apps.importing.draft import ImportFaults
 from factory.apps.importing.mesh_files import MeshStore, first_file, path_inside
 from factory.support.arrays import Array
@@ -22,7 +22,6 @@ from factory.support.rotations import rotation
 from factory.support.texts import near_file, quoted
 from factory.theory.lang.operations import MESHES
 from factory.theory.lang.values import GEOMETRY
-from factory.theory.problem.pag import SHAPES
 
 CLEAN, NOISE = 0.1, 1e-6
 """A clean rotation is by multiples of so many degrees about the axes; one that differs from it by
@@ -110,10 +109,10 @@ class PartMaker:
     ) -> tuple[Parameter, ...]:
         """The parameters of a part in a frame, with its mesh fetched and lengths in metres. Two
         shapes, and an unknown mesh, are noted as faults."""
-        shapes = [name for name in SHAPES if name in values]
+        shapes = [name for name in PAG.SHAPES if name in values]
         if len(shapes) > 1:
             message = f"a part has one shape, but '{shapes[0]}' and '{shapes[1]}' are given"
-            self.faults.add("BadValue", message, position, f"keep one of {', '.join(SHAPES)}")
+            self.faults.add("BadValue", message, position, f"keep one of {', '.join(PAG.SHAPES)}")
         metres = self.metres(values)
         if "mesh" in values:
             path = self._mesh(str(values["mesh"]), position)

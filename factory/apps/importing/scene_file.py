@@ -16,9 +16,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from factory.api import listing
 from factory.apps.importing import threemf_file
 from factory.apps.importing.bodies import MOST_PARTS, Bodies, FileBody, most_of, solids_of
+from factory.support.errors import listing
 from factory.support.files import MESH, read_bytes
 from factory.support.meshes.glb_reader import Colour, GlbBody, read_glb
 from factory.support.meshes.mesh_file import EXPECTED, MeshFile, UnreadableMesh, checked

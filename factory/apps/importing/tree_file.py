@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.api import Parameter, Value
+from factory.api import PAG, Parameter, Value
 from factory.apps.importing.document import DocumentNode as Node
 from factory.apps.importing.draft import (
     MATE,
@@ -22,7 +22,6 @@ from factory.support.errors import did_you_mean
 from factory.support.texts import quoted
 from factory.theory.lang.operations import MESHES, Signature
 from factory.theory.lang.values import GEOMETRY, Kind
-from factory.theory.problem.pag import SHAPES
 
 GROUP = ("name", "children", "operation", "parameters", "at", "quat")
 LEAF = ("name", "part", "at", *(name for name in GEOMETRY if name not in ("pos", "mesh")))
@@ -79,7 +78,7 @@ class TreeReader:
         self._name(fields, draft)
         if is_group:
             return self._group(fields, draft, place)
-        if not {"part", *SHAPES} & set(fields) and len(self.faults.diagnostics) == before:
+        if not {"part", *PAG.SHAPES} & set(fields) and len(self.faults.diagnostics) == before:
             self._empty(draft, "it has neither children nor a part")
         self._part(fields, draft, place)
         return (), place

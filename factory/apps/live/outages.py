@@ -9,9 +9,9 @@ from math import ceil, isfinite
 
 import numpy as np
 
-from factory.api import listing
 from factory.apps.recovery import Recovery
 from factory.film.marks import Zone, Zones
+from factory.support.errors import listing
 
 LONG = 1e8
 """A feeder that is empty for so long [s] is blocked by hand, which is shown elsewhere."""

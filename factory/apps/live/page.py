@@ -7,7 +7,7 @@ from html import escape
 
 import numpy as np
 
-from factory.api import HIDDEN, MonitorSubject, Operation, Replica, Simulation, names
+from factory.api import Model, MonitorSubject, Operation, Replica, Simulation, names
 from factory.apps.live.commands import FACTORS, SPEEDS
 from factory.apps.live.session import Session
 from factory.apps.report.drawings import data, floor_plan, labels_of, net_drawing
@@ -50,7 +50,7 @@ def page(session: Session, command: str = "factory view FILE.pag") -> bytes:
             "parents": {},
             "moving": session.bodies.tolist(),
             "turning": session.bodies.tolist(),
-            "hidden": HIDDEN,
+            "hidden": Model.HIDDEN,
             "position": np.round(stage.position, 5).tolist(),
             "quaternion": np.round(stage.quaternion, 6).tolist(),
             "reach": np.round(stage.reach[:, session.bodies], 4).tolist(),

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.engine.mjcf.model import memory_of
+from factory.api import Model
 from factory.support.files import MIB
 
 LARGEST, TAGS, DEEPEST = 256 * MIB, 2_000_000, 32
@@ -122,7 +122,7 @@ def _check(element: Element, files: Mapping[str, bytes]) -> None:
 
 def _check_memory(root: Element) -> None:
     """Raises ValueError where a model asks for more memory than it needs."""
-    most = memory_of(root) + SPARE
+    most = Model.memory_of(root) + SPARE
     for element in root.iter("size"):
         asked = element.get("memory", "0M").removesuffix("M")
         if not (asked.isdecimal() and int(asked) <= most):

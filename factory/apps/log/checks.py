@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import Demand, LayoutTable, RunVerdict, WorldName
+from factory.api import Demand, LayoutTable, MonitorTable, RunVerdict, WorldName
 from factory.apps.log.blocks import Arrays
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.project_table import ProjectTable
-from factory.engine.record.subject import MonitorTable
 from factory.support.tables import LARGE, value_of
 
 HEADER = "header"

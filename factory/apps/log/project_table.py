@@ -36,10 +36,10 @@ from factory.api import (
 )
 from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
+from factory.engine.record.history import firings
 from factory.support.tables import MISFITS, misfit, table_of, value_of
 from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.nets.history import firings
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import CutOff, Entry, Failures, InputError
+from factory.api import CutOff, Failures, InputError, Undone
 from factory.apps.log.blocks import (
     LENGTH,
     MAGIC,
@@ -41,7 +41,6 @@ from factory.apps.log.failed import Placed, failures_of, failures_so_far, undone
 from factory.support.claim import is_claimed
 from factory.support.files import LOG, head_of
 from factory.support.tables import misfit
-from factory.theory.nets.undone import lasting
 
 Index = NDArray[np.int32]
 
@@ -144,16 +143,16 @@ class Log:
         return tuple((t, names[n]) for t, n in zip(self.fired_t.tolist(), self.fired, strict=True))
 
     @cached_property
-    def timed_entries(self) -> tuple[tuple[float, Entry], ...]:
+    def timed_entries(self) -> tuple[tuple[float, str | Undone], ...]:
         """Time [s] and name of every transition that fired, with the undos in between."""
-        entries, begin = list[tuple[float, Entry]](), 0
+        entries, begin = list[tuple[float, str | Undone]](), 0
         for after, undone in self.undone:
             entries += [*self.events[begin:after], (undone.t, undone)]
             begin = after
         return (*entries, *self.events[begin:])
 
     @property
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[str | Undone, ...]:
         """The timed entries without their times, for a replay."""
         return tuple(entry for _, entry in self.timed_entries)
 
@@ -162,7 +161,7 @@ class Log:
         """Time [s] and name of every transition that fired and was not undone."""
         if not self.undone:
             return self.events
-        kept, entries = lasting(self.entries), self.timed_entries
+        kept, entries = Undone.lasting(self.entries), self.timed_entries
         return tuple((t, e) for t, e in (entries[at] for at in kept) if isinstance(e, str))
 
 

@@ -15,7 +15,7 @@ def beside(simulation: Recordable) -> EngineMonitor:
     one that need not be called after every tick. It uses only the engine, the layout, the start of
     the simulation, and the times at which operations end."""
     subject = MonitorSubject.of_run(simulation)
-    anatomy = Anatomy.of(simulation.engine, simulation.layout.factory, subject.bent)
+    anatomy = Anatomy.of(simulation.engine, subject)
     first = simulation.state().observation
     monitor = EngineMonitor(subject, anatomy, first)
     simulation.at_ends.append(monitor.observe)

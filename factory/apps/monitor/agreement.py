@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
-from factory.api import Entry, MonitorSubject, PetriNet, Undone
+from factory.api import MonitorSubject, PetriNet, Undone
 from factory.engine.record.findings import Firing, Violation
 
 ROUNDING = 1e-9
@@ -48,7 +48,7 @@ def disagreements(
 
 def contradictions(
     subject: MonitorSubject,
-    entries: Iterable[tuple[float, Entry]],
+    entries: Iterable[tuple[float, str | Undone]],
     markings: Iterable[tuple[float, Sequence[int]]],
 ) -> Iterator[Violation]:
     """The first marking in a log that does not follow from its entries, firings and undos. Each
@@ -71,7 +71,7 @@ def contradictions(
             return
 
 
-def _play(net: PetriNet, tokens: list[int], entry: Entry) -> None:
+def _play(net: PetriNet, tokens: list[int], entry: str | Undone) -> None:
     """Fire a transition, or the transitions of an undo backwards."""
     names, sign = (entry.transitions, -1) if isinstance(entry, Undone) else ((entry,), 1)
     for name in names:

@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from factory.api import Factory, names
-from factory.engine.mjcf.weld_frames import HINGE, SLIDE, WeldFrames, chain_of
-from factory.floor.layout.chains import SoughtCurves
+from factory.api import MonitorSubject, WeldFrames, names
 from factory.support.arrays import Array, Index
 
 if TYPE_CHECKING:
@@ -24,34 +22,32 @@ KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 """What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
 the outfeed's tray."""
 
-Bent = tuple[tuple[int, ...], SoughtCurves]
-"""The robots (index) whose first axes move several joints, and the curves along which they do."""
-
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BentWays:
-    """The `ways` of the `robots` (b,) whose first axes move d joints, along bends or chains, and
-    the addresses (b, d) of the positions, speeds and setpoints of these."""
+    """The `robots` (b,) of a subject whose first axes move d joints, along bends or chains, and the
+    addresses (b, d) of the positions, speeds and setpoints of these."""
 
     robots: Index
-    ways: SoughtCurves
+    subject: MonitorSubject
     slides: Index
     dofs: Index
     drives: Index
 
     @classmethod
-    def of(cls, m: Any, factory: Factory, bent: Bent) -> BentWays:
-        """Those of a factory's robots in a model. Raises KeyError where it lacks them."""
-        (robots, ways), shape = bent, (-1, bent[1].dimension)
+    def of(cls, m: Any, subject: MonitorSubject) -> BentWays:
+        """Those of a subject's robots in a model. Raises KeyError where it lacks them."""
+        (robots, ways), factory = subject.bent, subject.factory
+        shape = -1, ways.dimension
         moved = [pair for robot in robots for pair in names.moved_along(factory.robots[robot])]
         joints = np.array([m.joint(joint).id for joint, _ in moved], np.intp).reshape(shape)
         drives = np.array([m.actuator(drive).id for _, drive in moved], np.intp).reshape(shape)
         return cls(
             np.array(robots, np.intp),
-            ways,
+            subject,
             np.asarray(m.jnt_qposadr[joints], np.intp),
             np.asarray(m.jnt_dofadr[joints], np.intp),
             np.asarray(m.actuator_ctrladr[drives], np.intp),
@@ -59,16 +55,16 @@ class BentWays:
 
     def along(self, qpos: Array, qvel: Array) -> tuple[Array, Array]:
         """Their arc lengths [m] and speeds [m/s]."""
-        x, first = self.ways.nearest(qpos[self.slides])
+        x, first = self.subject.bent[1].nearest(qpos[self.slides])
         return x, (qvel[self.dofs] * first).sum(axis=-1) / (first**2).sum(axis=-1)
 
     def apart(self, qpos: Array) -> Array:
         """How far robots (b,) are from their ways [m, rad]."""
-        return self.ways.apart(qpos[self.slides])
+        return self.subject.bent[1].apart(qpos[self.slides])
 
     def reached(self, ctrl: Array) -> Array:
         """The arc lengths [m] of their setpoints."""
-        return self.ways.nearest(ctrl[self.drives])[0]
+        return self.subject.bent[1].nearest(ctrl[self.drives])[0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,17 +94,18 @@ class Anatomy:
     bent: BentWays = field(repr=False)
 
     @classmethod
-    def of(cls, m: Any, factory: Factory, bent: Bent) -> Anatomy:
-        """The anatomy of a model of a factory, some of whose guidepaths are `bent`. Raises
-        ValueError where the model is not of that factory."""
+    def of(cls, m: Any, subject: MonitorSubject) -> Anatomy:
+        """The anatomy of a model of a subject's factory. Raises ValueError where the model is not
+        of that factory."""
         from factory.support.engine import mujoco
 
+        factory = subject.factory
         robots = {r.name: r.index for r in factory.robots}
         try:
             slide = [m.joint(names.first_axis(r)).id for r in factory.robots]
             firsts = factory.axes[: len(factory.robots)]
             drive = [m.actuator(names.actuator(axis)).id for axis in firsts]
-            ways = BentWays.of(m, factory, bent)
+            ways = BentWays.of(m, subject)
         except KeyError as error:
             raise ValueError(f"the model is not of this factory: {error}") from error
         actuators = range(len(m.actuator_ctrladr))
@@ -159,11 +156,11 @@ def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     joints, up = m.body_jntnum, m.body_parentid
     first = np.minimum(m.body_jntadr, m.njnt - 1)
     last = m.jnt_type[np.minimum(m.body_jntadr + np.maximum(joints, 1), m.njnt) - 1]
-    slides = (joints == 0) | (joints <= 2) & (m.jnt_type[first] == SLIDE) & (last == SLIDE)
-    upright = abs(m.jnt_axis[first, 2]) == 1.0
-    turns = (joints == 1) & (m.jnt_type[first] == HINGE) & upright
+    slide, hinge = (m.jnt_type[first] == kind for kind in (WeldFrames.SLIDE, WeldFrames.HINGE))
+    slides = (joints == 0) | (joints <= 2) & slide & (last == WeldFrames.SLIDE)
+    turns = (joints == 1) & hinge & (abs(m.jnt_axis[first, 2]) == 1.0)
     for body in np.unique(m.eq_obj1id[welds]):
-        if chain_of(m, int(body)):
+        if WeldFrames.chain_of(m, int(body)):
             continue
         if not ((slides | turns)[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")

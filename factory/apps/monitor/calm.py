@@ -3,7 +3,7 @@
 States do not show undos, so each *spell* of a run is judged by itself, from the marking in which it
 begins. A spell excludes the time from the beginning of a failed operation until every robot that
 was sent back has fired again, no part lies about, and no robot stands still. That an undo is the
-least possible is checked separately, from the record (`factory.theory.nets.replay`).
+least possible is checked separately, from the record (`factory.engine.record.replay`).
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _judged(
     offset = units.more(here, begin)
     if subject.word is not None:
         here = replace(here, word=subject.word.later(offset))
-    monitor = Monitor(here, Anatomy.of(m, subject.factory, subject.bent), next(inside))
+    monitor = Monitor(here, Anatomy.of(m, subject), next(inside))
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
     for observation in inside:
         monitor.see(observation)

@@ -12,9 +12,8 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.api import MonitorSubject, marked, token_free
+from factory.api import MonitorSubject
 from factory.engine.record.findings import Firing, Violation
-from factory.engine.timing.pool import with_wip
 
 
 @dataclass(slots=True)
@@ -63,8 +62,8 @@ class _Solver:
     def __init__(self, observed: SeenFirings, begin: float, end: float) -> None:
         self.observed, self.begin, self.end = observed, begin, end
         subject = observed.subject
-        factory, wip, counts = subject.factory, subject.wip, subject.counts
-        self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
+        factory, counts = subject.factory, subject.counts
+        self.net = subject.net
         self.names = [t.name for t in factory.net.threaded.transitions]
         self.dwell = {
             int(o.place): max(0.0, o.dwell - observed.slack) for o in factory.operations if o.dwell
@@ -105,7 +104,7 @@ class _Solver:
 
     def _order(self) -> list[tuple[int, int]]:
         """All firings, each after its preconditions."""
-        order = token_free(self.net).order
+        order = self.net.token_free.order
         first, last = min(self.done), max(self.count)
         return [
             (event, unit)

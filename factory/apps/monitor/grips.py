@@ -9,9 +9,8 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import MonitorSubject, Observation
+from factory.api import MonitorSubject, Observation, WeldFrames
 from factory.apps.monitor.anatomy import GRIP, HOLD, Anatomy
-from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.support.arrays import Array, Index
 
 HANGS = 2e-3

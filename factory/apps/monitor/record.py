@@ -16,9 +16,12 @@ from factory.api import (
     Factory,
     Failures,
     MonitorSubject,
+    MonitorTable,
     Observation,
     Report,
+    Run,
     RunVerdict,
+    WeldFrames,
 )
 from factory.apps.log.model import model_of
 from factory.apps.log.project_table import factory_of, of_its_factory, project_of, settings_of
@@ -28,12 +31,8 @@ from factory.apps.monitor.anatomy import Anatomy
 from factory.apps.monitor.calm import judge_calm
 from factory.apps.monitor.monitor import Monitor
 from factory.apps.monitor.recount import differences, recounted, worst
-from factory.engine.mjcf.weld_frames import SLIDE
 from factory.engine.record.findings import Violation
-from factory.engine.record.subject import MonitorTable
 from factory.support.tables import value_of
-from factory.theory.nets.replay import replay
-from factory.theory.plant.demand import Word
 
 JUMP = 3e-4
 """Tolerance of the displacement of a joint in a tick against its speeds [m]; correct logs stay
@@ -54,8 +53,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     m = model_of(log)
     with of_its_factory():
         subject = recorded_subject(log.header)
-        if word := word_of(log, subject.factory):
-            subject = replace(subject, word=word, wip=None)
+        if log.units is not None:
+            subject = _on_demand(log, subject)
         if log.failures is not None and log.failures != Failures():
             report = judge_calm(log, subject, m, partial(observations, log))
         else:
@@ -68,7 +67,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     """The report of a monitor on the states of a log, and on its firings and figures."""
-    seen, anatomy = observations(log), Anatomy.of(m, subject.factory, subject.bent)
+    seen, anatomy = observations(log), Anatomy.of(m, subject)
     monitor = Monitor(subject, anatomy, next(seen))
     for observation in seen:
         monitor.see(observation)
@@ -81,7 +80,7 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
 def jumps(log: Log, m: Any) -> Iterator[Violation]:
     """The first tick in which the displacement of each slide joint is inconsistent with its speeds
     at both ends of the tick."""
-    slides, reported = np.flatnonzero(m.jnt_type == SLIDE), set[int]()
+    slides, reported = np.flatnonzero(m.jnt_type == WeldFrames.SLIDE), set[int]()
     at, moves = m.jnt_qposadr[slides], m.jnt_dofadr[slides]
     for first in range(0, len(log) - 1, SPAN):
         rows = range(first, min(first + SPAN + 1, len(log)))
@@ -104,7 +103,7 @@ def verdict_on(
     """The verdict on a recorded run of a factory, from its log, the report of a monitor on it where
     there is one, and the faults of its model."""
     cut, start = log.cut_off, frozenset(log.header["start"])
-    refines = replay(factory.net, log.entries, start, factory.joins).refines
+    refines = Run.is_refined(factory, log.entries, start)
     trouble = None if cut is None else cut.failure
     counted = report.figures if report else None
     figures = log.figures if counted is None else worst(log.figures, counted)
@@ -145,17 +144,18 @@ def _rows(log: Log, first: int, last: int | None) -> Iterator[tuple[Log | Ends, 
             yield log, row, False
 
 
-def word_of(log: Log, factory: Factory) -> Word | None:
-    """The word of a recorded run of a factory on demand; None for a fixed sequence."""
-    if log.units is None:
-        return None
-    demand = value_of(Demand, log.header["demand"])
+def _on_demand(log: Log, subject: MonitorSubject) -> MonitorSubject:
+    """The subject of a recorded run on demand, with its word. Raises ValueError where that is not
+    what was ordered."""
+    assert log.units is not None
+    demand, header = value_of(Demand, log.header["demand"]), log.header
     *units, fixed = log.units
-    word = Word(factory.sequence, demand, log.header["units"], log.header["wip"], units, fixed)
+    sequence = subject.factory.sequence
+    word = demand.word(sequence, header["units"], header["wip"], units, fixed)
     for number, product in enumerate(word.products(0, len(units))):
         if not demand.allows(number, product):
             raise ValueError(f"unit {number + 1} is a {product}, which was not the next order")
-    return word
+    return replace(subject, word=word, wip=None)
 
 
 @of_its_factory()

@@ -17,8 +17,6 @@ import numpy as np
 from factory.api import MonitorSubject, Observation, Replica, names
 from factory.apps.log.reader import Log
 from factory.apps.monitor.anatomy import GRIP, HOLD, PARK, Anatomy
-from factory.engine.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
-from factory.engine.mjcf.pads import Pads, trunks
 from factory.engine.record.findings import Violation
 from factory.support.arrays import Array, Index
 from factory.support.engine import mujoco
@@ -133,10 +131,10 @@ class _Contacts:
         of_one = m.body_rootid[bodies[:, 0]] == m.body_rootid[bodies[:, 1]]
         self._links = {*map(frozenset, bodies[of_one].tolist())}
         self._replica.exclude_nothing()
-        self._trunk, self._solid = trunks(m), Pads(m).solid
+        self._trunk = self._replica.trunk
         self._code = _codes(m, subject)
         self._holds = _held(m, subject, anatomy)
-        self._in = np.full(m.nbody, NOBODY)
+        self._in = np.full(m.nbody, Replica.NOBODY)
         self._welds: Index | None = None
         self._touching: set[tuple[int, int]] = set()
         self._onsets: list[tuple[float, int, int]] = []
@@ -174,18 +172,15 @@ class _Contacts:
         fresh = [row for row in welds.tolist() if tuple(row) not in before]
         for body in {body for _, _, body in before} - {*welds[:, 2].tolist()}:
             if self._anatomy.copy_of[body] >= 0:
-                self._mask(body, loose_code(body))
+                self._replica.release(body)
         self._welds = welds
         for weld, holder, body in fresh:
             if self._anatomy.copy_of[body] < 0 or self._anatomy.holder[weld] is None:
                 continue
             parked = self._anatomy.holder[weld] == (PARK, -1)
-            code = NOBODY if parked else int(self._code[holder])
+            code = Replica.NOBODY if parked else int(self._code[holder])
             self._in[self._trunk == body] = code
-            self._mask(body, code)
-
-    def _mask(self, body: int, code: int) -> None:
-        self._replica.mask(self._solid[body], self._trunk == body, *masks_of(code))
+            self._replica.hold(body, code)
 
     def _intended(self, a: int, b: int, apart: float, marked: set[int]) -> bool:
         """Whether two geoms may touch: those of parts that are being joined or overlap in the
@@ -210,14 +205,14 @@ class _Places:
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any) -> None:
         self._replica, self._anatomy = Replica(m), anatomy
-        self._pads = Pads(self._replica.m)
+        self._pads = self._replica.pads
         self._kind = np.array([holder[0] if holder else -1 for holder in anatomy.holder])
         self._place = {label: np.array(place) for label, place in subject.places.items()}
         order = [part for x in subject.factory.products for part in subject.factory.contents[x]]
         self._order = {part: number for number, part in enumerate(order)}
         self.figures: dict[str, float | None] = dict.fromkeys(WORDS)
         self.most_error = 0.0
-        self._reach = _reaches(m)
+        self._reach = _reaches(self._replica)
 
     def look(self, before: Observation, now: Observation) -> None:
         """Measure the parts that changed hands between two observations."""
@@ -282,18 +277,19 @@ def _angle(one: Array, other: Array) -> float:
     return degrees(2 * float(np.arcsin(np.minimum(sine.max(), 1.0))))
 
 
-def _reaches(m: Any) -> Array:
+def _reaches(replica: Replica) -> Array:
     """Distance of the geoms of each body from its origin, or more (nbody,) [m]."""
+    m = replica.m
     reach = np.zeros(m.nbody)
     far = np.linalg.norm(m.geom_pos, axis=1) + m.geom_rbound
-    np.maximum.at(reach, trunks(m)[m.geom_bodyid], far)
+    np.maximum.at(reach, replica.trunk[m.geom_bodyid], far)
     return reach
 
 
 def _codes(m: Any, subject: MonitorSubject) -> Index:
     """The code of each body that holds parts (nbody,): of a robot from its number, of any other
     from the masks of its geoms."""
-    robots = {robot.name: robot_code(robot.index) for robot in subject.factory.robots}
+    robots = {robot.name: Replica.robot_code(robot.index) for robot in subject.factory.robots}
     codes = np.zeros(m.nbody, np.intp)
     np.maximum.at(codes, m.geom_bodyid, m.geom_contype >> 1)
     for body in range(m.nbody):

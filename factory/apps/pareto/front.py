@@ -11,7 +11,7 @@ from math import inf
 from pathlib import Path
 from typing import Any, Literal
 
-from factory.api import Observer, Project, RunRequest, Simulation, Timing, steady_from, write_pag
+from factory.api import Observer, Project, Run, RunRequest, Simulation, Timing, write_pag
 from factory.apps.analyze.timed import steady_units
 from factory.apps.drawing.tables import Tabular, titled
 from factory.apps.few_robots.aim import Least
@@ -114,7 +114,7 @@ def tried(project: Project, glances: Sequence[Observer] = ()) -> Trial:
     """The trial of a project's factory: as many units as are needed to reach the pace of its net,
     at most MOST, or two periods."""
     layout, settings = project.layout, project.settings
-    most = max(MOST, steady_from(layout.factory.period))
+    most = max(MOST, Run.steady_from(layout.factory.period))
     units = min(most, steady_units(Timing(layout, settings, "mujoco", SEED, JITTER)))
     fuse = fusing_pays(layout.factory, layout.product)
     asked = RunRequest("mujoco", units, SEED, JITTER, settings, fuse=fuse, shown=False)

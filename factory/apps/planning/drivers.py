@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 from manifold3d import Manifold
 
+from factory.api import DrawnSolids
 from factory.apps.planning.cannot import Direction
 from factory.apps.planning.parts import InPlace
-from factory.floor.geometry.overlap import drawn
 
 DRIVER = ((0.05, 0.006), (0.15, 0.02))
 """The radius of a driver from so far above a screw's head on [m]: a bit as wide as the head, its
@@ -33,7 +33,7 @@ class Drivers:
         return all(self._reaches(screw, way, other) for other in others)
 
     def _is_clear(self, screw: int, way: Direction, other: int) -> bool:
-        bodies = [drawn(part.solid) for part in self.units[other]]
+        bodies = [DrawnSolids.body(part.solid) for part in self.units[other]]
         column = self._driver(screw, way)
         volumes = ((column ^ body).volume() for body in bodies if body is not None)
         return column.is_empty() or all(volume <= LEAST for volume in volumes)

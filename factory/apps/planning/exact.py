@@ -23,11 +23,10 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Pace
+from factory.api import Approach, Pace
 from factory.apps.planning.divisions import Batch, Divisions, Late, Levels, TooLate, never
 from factory.apps.planning.subsets import LEVEL_PRICES, UNDER, Masks, Subsets
 from factory.support.arrays import Array
-from factory.theory.plant.approaches import MARGIN
 
 STATION = 0.06
 """The distance between two stations on a guidepath beyond the size of a sub-assembly [m]."""
@@ -59,7 +58,7 @@ class Expected:
 
     def lift(self, stroke: Array) -> Array:
         """The waiting time while a part is lowered by a stroke."""
-        return self.rest(np.maximum(stroke, 0.0) + MARGIN)
+        return self.rest(np.maximum(stroke, 0.0) + Approach.MARGIN)
 
 
 RELAY = 1.0

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.api import Product, Solid
+from factory.api import DrawnSolids, Product, Solid
 from factory.apps.planning.exploding import Explosion
 from factory.apps.planning.loose_parts import LOOSE_SAMPLES, LooseParts
 from factory.apps.planning.source import surface
-from factory.floor.geometry.overlap import drawn
 from factory.support.arrays import Array, Indices
 from factory.support.pictures.ink import Pixels
 from factory.support.pictures.sight import View, fit, towards
@@ -151,7 +150,7 @@ class _Stage(LooseParts):
 def _surface(solid: Solid, within: float) -> tuple[Array, Indices]:
     """The surface of a solid in place, with fewer triangles where these are about `within` a
     distance [m] of it."""
-    body = drawn(solid) if within and solid.mesh is not None else None
+    body = DrawnSolids.body(solid) if within and solid.mesh is not None else None
     if body is None:
         return surface(solid)
     mesh = body.simplify(within).to_mesh64()

@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import PAG, Product
-from factory.floor.mating.findings import Matings
+from factory.api import PAG, Approach, Matings, Product
 from factory.support.arrays import Array
-from factory.theory.plant.approaches import Approach, Kind
 
 ROOM = 0.15
 """The gap between separated inputs, as a share of the product's diagonal."""
@@ -32,7 +30,7 @@ class Withdrawal:
     moving: tuple[str, ...]
     direction: Array
     distance: float
-    kind: Kind
+    kind: str
 
 
 @dataclass(frozen=True)

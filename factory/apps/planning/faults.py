@@ -9,16 +9,13 @@ on the solids as drawn.
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, Solid, listing
+from factory.api import Diagnostic, DrawnSolids, InputError
 from factory.apps.planning.parts import PlacedPart
-from factory.floor.geometry.overlap import Common, drawn, overlap_of
-from factory.floor.geometry.overlapping import near_pairs
-from factory.floor.geometry.touching_groups import groups_of
 from factory.support.arrays import Array
+from factory.support.errors import listing
 from factory.support.meshes.bodies import connected
 
 LARGER = 50.0
@@ -146,33 +143,30 @@ def _gaps(low: Array, high: Array, lows: Array, highs: Array) -> Array:
 def check_in_place(parts: Sequence[PlacedPart], screws: Collection[str] = ()) -> list[Diagnostic]:
     """The faults of parts that are not in place (NotInPlace); empty if they are. What a screw, and
     a part that is none, have in common is a thread, no fault."""
-    solids = [part.solid for part in parts]
-    bodies = [drawn(solid) for solid in solids]
-    faults = _inside(solids, bodies, screws)
-    return faults or _groups(solids)
+    there = DrawnSolids([part.solid for part in parts])
+    return _inside(there, screws) or _groups(there)
 
 
-def _inside(
-    solids: Sequence[Solid], bodies: Sequence[Any], screws: Collection[str]
-) -> list[Diagnostic]:
+def _inside(there: DrawnSolids, screws: Collection[str]) -> list[Diagnostic]:
     """Parts that are inside one another."""
-    overlaps: list[tuple[float, str, str, Common]] = []
-    for one, other in near_pairs(solids, -DEPTH).tolist():
+    solids, bodies = there.solids, there.bodies
+    overlaps: list[tuple[float, str, str, float]] = []
+    for one, other in there.near(-DEPTH).tolist():
         threaded = (solids[one].label in screws) != (solids[other].label in screws)
         if threaded or bodies[one] is None or bodies[other] is None:
             continue
         small, large = sorted((one, other), key=lambda n: float(bodies[n].volume()))
-        shared = overlap_of(solids[small], solids[large])
+        shared = there.common(small, large)
         share = shared.volume / float(bodies[small].volume())
         thinner = min(2 * bodies[n].volume() / bodies[n].surface_area() for n in (one, other))
         if share > MOST or (share > SHARE and shared.depth > min(DEPTH, THIN * thinner)):
-            overlaps.append((share, solids[small].label, solids[large].label, shared))
+            overlaps.append((share, solids[small].label, solids[large].label, shared.depth))
     if not overlaps:
         return []
     overlaps.sort(key=lambda pair: -pair[0])
     named = [
-        f"{share:.0%} of '{small}' is in '{large}' ({1e3 * shared.depth:.1f} mm deep)"
-        for share, small, large, shared in overlaps
+        f"{share:.0%} of '{small}' is in '{large}' ({1e3 * depth:.1f} mm deep)"
+        for share, small, large, depth in overlaps
     ]
     pairs = (
         "a pair of parts overlaps"
@@ -184,9 +178,9 @@ def _inside(
     return [Diagnostic("NotInPlace", message, None, hint)]
 
 
-def _groups(solids: Sequence[Solid]) -> list[Diagnostic]:
+def _groups(there: DrawnSolids) -> list[Diagnostic]:
     """Groups of parts that do not touch each other."""
-    groups = groups_of(solids)
+    groups = there.groups
     if len(groups.firsts) == 1:
         return []
     message = f"these parts are not in place: they are {groups}"

@@ -19,7 +19,6 @@ from factory.api import (
     Project,
     Settings,
     Template,
-    listing,
     load_catalogue,
     pace,
     product_geometry,
@@ -36,6 +35,7 @@ from factory.apps.planning.subsets import Stance
 from factory.apps.planning.writing import Screwed, planned_product, screw_lines, screws_in
 from factory.apps.planning.writing import Tree as LabelTree
 from factory.support.allowance import Allowance
+from factory.support.errors import listing
 
 LAID = 120
 """Trees are laid out until they have more robots together, unless a time is given."""

@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Replica
-from factory.engine.mjcf.model import SKELETON
-from factory.engine.mjcf.scene import FILL, KEY
+from factory.api import Model, Replica
 from factory.film.painter import Renderer
 from factory.support.arrays import Array, Indices
 from factory.support.engine import mujoco
@@ -29,12 +27,13 @@ def loose_parts(
 ) -> mujoco.MjModel:
     """Bodies that are free to move, in the order of `surfaces`: vertices (n, 3) [m] and faces
     (m, 3) by label. `floor`: its height; `size`: that of the product [m]."""
-    spec = mujoco.MjSpec.from_string(SKELETON.read_text("utf-8"))
+    spec = mujoco.MjSpec.from_string(Model.SKELETON.read_text("utf-8"))
     world = spec.worldbody
     ground = {"name": "floor", "type": mujoco.mjtGeom.mjGEOM_PLANE, "material": "floor"}
     world.add_geom(**ground, size=(FLOOR * size, FLOOR * size, 0.1), pos=(0, 0, floor))
     kind = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    for name, ray, shadow, diffuse in (("key", KEY, True, 0.5), ("fill", FILL, False, 0.15)):
+    lights = ("key", Renderer.KEY, True, 0.5), ("fill", Renderer.FILL, False, 0.15)
+    for name, ray, shadow, diffuse in lights:
         at = -3.0 * size * np.asarray(ray)
         light = {"name": name, "dir": ray, "pos": at, "type": kind, "castshadow": shadow}
         world.add_light(**light, diffuse=[diffuse] * 3, specular=[0.1 * shadow] * 3)

@@ -6,14 +6,14 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from factory.api import Diagnostic, InputError, Template, listing
+from factory.api import Diagnostic, InputError, Settings, Template
 from factory.apps.planning.cannot import Interlock, named
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.plan import CannotAssemble, Planned
 from factory.apps.planning.posing import in_words
 from factory.apps.planning.writing import planned_product
+from factory.support.errors import listing
 from factory.support.files import head_of, own_names, write_all
-from factory.support.user_defaults import NAME
 
 HEAD = b"# written by `factory plan`: equal screws are brought by one robot, and driven in by one\n"
 """The first line of the settings that are written with a plan."""
@@ -33,7 +33,7 @@ def write_planned(
     tree = planned.tree, planned.orientation
     made = planned_product(placed, *tree, source.name, allow, templates, planned.screws)
     files = {folder / name: content for name, content in made.files.items()}
-    files |= _settings(folder / NAME, planned.lines)
+    files |= _settings(folder / Settings.FILE, planned.lines)
     own_names(folder, files)
     write_all(files)
     return tuple(files)

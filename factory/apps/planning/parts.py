@@ -11,12 +11,21 @@ from types import MappingProxyType
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Diagnostic, InputError, Mesh, Product, Solid, listing
-from factory.floor.geometry.overlap import drawn
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    Diagnostic,
+    DrawnSolids,
+    InputError,
+    Mesh,
+    Product,
+    Solid,
+)
 from factory.floor.geometry.overlapping import Overlapping
 from factory.support.arrays import Array, Indices
+from factory.support.errors import listing
 from factory.support.meshes.triangles import is_closed
-from factory.theory.problem.pag import AllowedOverlap
 
 EXTRA = "pip install 'klavins-factory[decompose]'"
 
@@ -46,7 +55,7 @@ def refuse_hidden(source: InPlace, pairs: Sequence[Overlapping]) -> None:
             for pair in pairs
             if part.label in (pair.one, pair.other)
         ]
-        if others and drawn(part.solid) is None:
+        if others and DrawnSolids.body(part.solid) is None:
             mesh = part.solid.mesh
             is_open = mesh is not None and not is_closed(mesh.faces)
             state = "is open" if is_open else "bounds no volume"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Diagnostic, InputError, listing
+from factory.api import Diagnostic, InputError
 from factory.apps.planning.blocking import Blocking
 from factory.apps.planning.cannot import Direction, Interlock, interlocks, named
 from factory.apps.planning.parts import InPlace
@@ -17,6 +17,7 @@ from factory.apps.planning.shanks import shank_of
 from factory.apps.planning.standing import STEADY, TIPS, overhang
 from factory.apps.planning.turning import only, turned, turns
 from factory.support.arrays import Array
+from factory.support.errors import listing
 
 AS_DRAWN: Direction = (2, +1)
 """z is up."""

@@ -11,7 +11,7 @@ from math import inf
 
 import numpy as np
 
-from factory.api import PAG, Template, expand, product_geometry
+from factory.api import PAG, Node, Template, product_geometry
 from factory.apps.planning.bases import EQUAL, likely, worth
 from factory.apps.planning.blocking import NO_RELATION, Blocking, Unheld
 from factory.apps.planning.divisions import KnownDivisions
@@ -152,7 +152,7 @@ def _kept_prices(source: InPlace, templates: Mapping[str, Template]) -> Callable
         parts = tuple(part for part in source.parts if part.label in kept[label].parts)
         alone = replace(source, parts=parts, kept=(kept[label],))
         pag = PAG(label, planned_product(alone, label, stance.rotation).pag.nodes)
-        judged = matings(expand(pag, templates), product_geometry(pag, source.files))
+        judged = matings(Node.expand(pag, templates), product_geometry(pag, source.files))
         return BLOCKED * len(judged.of_kind("blocked"))
 
     def prices(stance: Stance) -> Array:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.api import DrawnSolids
 from factory.apps.planning.names import Says, says
 from factory.apps.planning.parts import PlacedPart
-from factory.floor.geometry.overlap import drawn
 from factory.support.arrays import Array
 
 HEAD, SHANK, SHORT, ROUND = 0.85, 0.75, 0.5, 0.16
@@ -67,7 +67,7 @@ class Shank:
         low, high = part.solid.low - self.radius, part.solid.high + self.radius
         if (self.ends.max(axis=0) < low).any() or (self.ends.min(axis=0) > high).any():
             return False
-        body = drawn(part.solid)
+        body = DrawnSolids.body(part.solid)
         if body is None:
             return self.is_inside(part)
         (first, last), along = np.sort(self.ends[:, self.axis]), self.axis
@@ -185,5 +185,5 @@ def called(part: PlacedPart) -> Says:
 
 def _is_massive(part: PlacedPart, shank: Shank) -> bool:
     """Whether a part has material on the axis of its shank: a plate with a hole has none."""
-    body = drawn(part.solid)
+    body = DrawnSolids.body(part.solid)
     return body is None or any(is_solid(body, point) for point in shank.points)

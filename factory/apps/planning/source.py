@@ -13,6 +13,7 @@ from factory.api import (
     PAG,
     Assembly,
     Diagnostic,
+    DrawnSolids,
     InputError,
     Product,
     Solid,
@@ -31,8 +32,6 @@ from factory.apps.importing.scene_file import MESHES, SCENES
 from factory.apps.planning.faults import check_in_place, check_places, raise_if_any
 from factory.apps.planning.parts import EXTRA, InPlace, Kept, PlacedPart, hull_stands
 from factory.apps.planning.shanks import screws_among
-from factory.floor.geometry.decomposition import can_decompose
-from factory.floor.geometry.overlap import drawn
 from factory.support.arrays import Array, Indices
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean
@@ -41,7 +40,6 @@ from factory.support.meshes.mesh_file import ANEW
 from factory.support.meshes.triangles import convex_hull
 from factory.support.rotations import rotation
 from factory.support.texts import quoted
-from factory.theory.problem.pag import SHAPES
 
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
@@ -148,7 +146,7 @@ def _stored(node: Assembly, pag: PAG, store: MeshStore, faults: list[Diagnostic]
     """A node, after its mesh, if it has one, was added to the store."""
     if node.inputs:
         return node
-    if not any(p.name in SHAPES for p in node.parameters):
+    if not any(p.name in PAG.SHAPES for p in node.parameters):
         message = f"'{node.label}' has no shape: its place is known only from the tree"
         hint = "give it a mesh, a box, a cylinder or a sphere, and its pos"
         faults.append(Diagnostic("MissingPart", message, node.position, hint))
@@ -201,7 +199,7 @@ def placed(
     BadValue)."""
     product = product_geometry(pag, files, decomposed=False)
     solids = dict(product.solids)
-    if can_decompose() and (beside := _beside_open(product)):
+    if DrawnSolids.can_decompose() and (beside := _beside_open(product)):
         nodes = [node for node in pag.parts() if node.label in beside]
         whole = Assembly(pag.root, "mate", tuple(node.label for node in nodes))
         solids |= product_geometry(replace(pag, nodes=(whole, *nodes)), files).solids
@@ -209,14 +207,15 @@ def placed(
     for node in pag.parts():
         solid = solids[node.label]
         parts.append(PlacedPart(node.label, *surface(solid), node.label, solid, node))
-    return tuple(parts), (*product.warnings, *(() if can_decompose() else _hulls(parts)))
+    hulls = () if DrawnSolids.can_decompose() else _hulls(parts)
+    return tuple(parts), (*product.warnings, *hulls)
 
 
 def _beside_open(product: Product) -> set[str]:
     """The parts that bound no volume, and those whose boxes meet theirs: what these block is known
     by convex bodies."""
     solids = product.solids
-    boxes = [solid for solid in solids.values() if drawn(solid) is None]
+    boxes = [solid for solid in solids.values() if DrawnSolids.body(solid) is None]
     return {
         label
         for label, solid in solids.items()
@@ -232,7 +231,7 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
         file = str(part.node.parameter("mesh"))
         if file not in warnings and hull_stands(part.solid.mesh):
             message = f"{file} is not convex; its convex hull is used instead"
-            hint = AS_BODIES if can_decompose() else DECOMPOSE
+            hint = AS_BODIES if DrawnSolids.can_decompose() else DECOMPOSE
             many = f"meshes are not convex: their convex hulls are used ({hint})"
             warnings[file] = Diagnostic("BadMesh", message, part.node.position, hint, many)
     return list(warnings.values())

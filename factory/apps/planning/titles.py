@@ -8,8 +8,8 @@ from itertools import count
 
 import numpy as np
 
+from factory.api import DrawnSolids
 from factory.apps.planning.parts import InPlace, PlacedPart
-from factory.floor.geometry.overlap import drawn
 from factory.support.arrays import Array
 
 LONGEST = 40
@@ -68,7 +68,7 @@ class Titles:
         shared = np.prod(np.maximum(np.minimum(high, top) - np.maximum(low, bottom), 0.0))
         if shared < INSIDE * np.prod(high - low):
             return False
-        bodies = [drawn(part.solid) for part in self.units[other]]
+        bodies = [DrawnSolids.body(part.solid) for part in self.units[other]]
         middle, far = (low + high) / 2, float(np.linalg.norm(top - bottom))
         ends = [middle + far * way for way in (*np.eye(3), *-np.eye(3))]
         around = [any(b is not None and b.ray_cast(middle, end) for b in bodies) for end in ends]

@@ -11,15 +11,22 @@ from typing import Any, Generic, TypeVar, Union
 
 import numpy as np
 
-from factory.api import PAG, Assembly, Template, expand, product_geometry, write_pag
+from factory.api import (
+    PAG,
+    AllowedOverlap,
+    Assembly,
+    DrawnSolids,
+    Node,
+    Template,
+    product_geometry,
+    write_pag,
+)
 from factory.apps.importing.draft import file_stem, label_of
 from factory.apps.importing.part_maker import Placement
 from factory.apps.planning.parts import InPlace
 from factory.apps.planning.titles import Titles
-from factory.floor.geometry.overlapping import overlaps_of
 from factory.floor.mating.mating import matings
 from factory.support.arrays import Array
-from factory.theory.problem.pag import AllowedOverlap
 
 Unit = TypeVar("Unit", bound=str | int)
 
@@ -140,12 +147,12 @@ def _meant(
     units = {part.label: label for label, parts in source.units() for part in parts}
     pairs = [{*name.split(":")} for name in allow]
     deep: dict[tuple[str, str], float] = {}
-    for pair in overlaps_of(product).pairs:
+    for pair in DrawnSolids.overlaps(product).pairs:
         is_thread = (pair.one in threaded) != (pair.other in threaded)
         needed = pair.depth > pag.most_allowed(pair.one, pair.other)
         if {units[pair.one], units[pair.other]} in pairs or (is_thread and needed):
             deep[pair.one, pair.other] = pair.depth
-    judged = matings(expand(pag, templates), product).all if allow else ()
+    judged = matings(Node.expand(pag, templates), product).all if allow else ()
     for clash in (clash for mating in judged for clash in mating.clashes):
         both = {units[part] for part in clash.parts}
         if both in pairs or both & {*allow}:

@@ -10,16 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from factory.api import Layout, Pace
+from factory.api import Detour, Layout, LayoutMachines, Pace
 from factory.apps.platen.placing import Floor, Placing
-from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.branches import branch_of
-from factory.floor.layout.feeding import cleared
-from factory.floor.layout.presence import ROUNDING
-from factory.floor.layout.way import Bend, rounding_for
 from factory.support.decimals import up
 
 TRIES, EFFORT = 220, 120_000
@@ -68,10 +64,10 @@ class Reach:
         at = {o.index: layout.visits[o.index, robot].at for o in gear}
         heads = [path.reach, *(at[o.index] for o in gear if o.carrier != robot)]
         tail = max((path.length - at[o.index] for o in gear if o.carrier == robot), default=0.0)
-        aside = [0.0, 0.0] if tail < ROUNDING else []
+        aside = [0.0, 0.0] if tail < LayoutMachines.ROUNDING else []
         if layout.magazine(robot):
-            tail = max(tail, cleared(layout, robot, 0.0))
-            aside = [cleared(layout, robot, side) for side in (1.0, -1.0)] if aside else []
+            cleared = partial(LayoutMachines(layout).cleared, robot)
+            tail, aside = max(tail, cleared(0.0)), [*map(cleared, (1.0, -1.0))] if aside else []
         return cls(max(heads), tail, tuple(aside))
 
 
@@ -90,13 +86,12 @@ class _Search:
     def __init__(self, layout: Layout, pace: Pace, seed: int) -> None:
         self.layout, self.pace, self.ground = layout, pace, Floor(layout)
         self.most = SLOWER * pace.cycle_of(layout)
-        full = rounding_for(pace.speed, pace.acceleration)
+        full = pace.rounding
         self.roundings = [full, *(small for small in SHARPER if small < full)]
         self.rng = np.random.default_rng(seed)
         goes = [r for r, path in enumerate(layout.guidepaths) if r and path.travels]
         self.reach = {robot: Reach.of(layout, robot) for robot in goes}
-        on = self.ground.on
-        self.under = [branch_of(on, robot) for robot in range(len(on))]
+        self.under = [*map(self.ground.search.branch, range(len(self.ground.on)))]
         self.begin = Placing(self.ground, {})
         low, high, lowest, highest = self.begin.hulls[0]
         self.middle = np.array([(low + high) / 2, (lowest + highest) / 2])
@@ -118,7 +113,7 @@ class _Search:
             there.look(under)
             if self.worth(there, size) + press * there.deep.sum() > limit:
                 continue
-            made = bent(self.layout, there.detours)
+            made = self.ground.bent(there.detours)
             if self.pace.cycle_of(made) > self.most:
                 continue
             here = there
@@ -165,9 +160,9 @@ class _Search:
         if tail == 0.0:
             least = reach.aside[int(across > 0)] + rounding
             far = max(up(abs(across)), up(least))
-            bend = Bend(at, float(np.copysign(far + BEYOND, across)))
-            return Detour(round(at + far - path.reach, 3), (bend,), rounding)
+            side = float(np.copysign(far + BEYOND, across))
+            return Detour.across(round(at + far - path.reach, 3), at, side, rounding)
         tail = max(up(tail), up(reach.tail + rounding))
         across = round(float(np.copysign(max(abs(across), 2 * rounding), across)), 3)
         travel = round(at + abs(across) + tail - path.reach, 3)
-        return Detour(travel, (Bend(at, across),), rounding)
+        return Detour.across(travel, at, across, rounding)

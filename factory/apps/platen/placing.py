@@ -12,11 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from factory.api import Layout, carriers
-from factory.floor.layout.bending import Detour, bent
-from factory.floor.layout.certificate import STATIONS, Region
-from factory.floor.layout.crowding import Crowding
-from factory.floor.layout.sweeps import piles, regions_of
+from factory.api import Detour, Layout, LayoutMachines, LayoutSearch, Region
 from factory.support.arrays import Array, Index, Truth
 from factory.support.boxes import Point2
 
@@ -39,9 +35,10 @@ class Floor:
     """The regions of a layout as its guidepaths are bent, branch by branch."""
 
     def __init__(self, layout: Layout) -> None:
-        self.layout, self.on = layout, carriers(layout.factory)
-        self._piles = piles(layout.factory, layout.product)
-        self._crowding = Crowding(layout)
+        self.layout, self.search = layout, LayoutSearch(layout.factory, layout.product)
+        self.on = self.search.carriers
+        self._machines = LayoutMachines(layout)
+        self._crowding = self._machines.crowding
         self._kinds, self._regions = dict[Region, int](), list[Region]()
         self._may = np.zeros((0, 0), np.int8)
         self._known = dict[tuple[int, Detour | None], Swept]()
@@ -50,8 +47,7 @@ class Floor:
         """The regions of a robot whose carrier has not moved."""
         key = robot, detour
         if key not in self._known:
-            layout = self.layout if detour is None else bent(self.layout, {robot: detour})
-            swept_regions = [*regions_of(layout, robot, self._piles)]
+            layout, swept_regions = self._machines.bent_regions(robot, detour)
             kinds = [replace(region, box=(0.0, 0.0, 0.0, 0.0)) for region in swept_regions]
             numbers = [self._kinds.setdefault(kind, len(self._kinds)) for kind in kinds]
             self._regions[:] = self._kinds
@@ -60,6 +56,10 @@ class Floor:
             boxes = np.array([region.box for region in swept_regions]).reshape(-1, 4)
             self._known[key] = Swept(boxes, np.array(numbers, np.intp), (x - x0, y - y0))
         return self._known[key]
+
+    def bent(self, bends: Bends) -> Layout:
+        """The layout with bends; not certified."""
+        return self._machines.bent(bends)
 
     def overlap(self, one: Swept, other: Swept, apart: Array) -> float:
         """By how much the regions of two robots are nearer than they may be [m], the second moved
@@ -85,7 +85,7 @@ class Floor:
             *zip(*(k[self._may[one, other] < 0].tolist() for k in (one, other)), strict=True)
         }:
             a, b = (self._regions[kind] for kind in pair)
-            is_one_robot = a.robot == b.robot and (a.kind in STATIONS) == (b.kind in STATIONS)
+            is_one_robot = a.robot == b.robot and a.stands == b.stands
             self._may[pair] = self._may[pair[::-1]] = (
                 a.layer != b.layer or is_one_robot or self._crowding.may_meet(a, b)
             )

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from factory.api import Ground, Hands, Layout, Pace, RunError, Settings, certified
+from factory.api import Ground, Hands, Layout, LayoutMachines, Pace, RunError, Settings
 from factory.apps.platen.compacting import compacted
 from factory.support.boxes import Point2
 
@@ -16,11 +16,11 @@ def on_platen(layout: Layout, pace: Pace, tile: float, wanted: Point2 | None = N
     depth."""
     for made in reversed(compacted(layout, pace)):
         try:
-            layout = certified(made)
+            layout = LayoutMachines(made).certified()
             break
         except RunError:  # the search knows regions only; the one before takes a little more
             continue
-    return certified(replace(layout, tile=tile), wanted)
+    return LayoutMachines(replace(layout, tile=tile)).certified(wanted)
 
 
 def platen(layout: Layout, ground: Ground, settings: Settings, hands: Hands) -> Layout:

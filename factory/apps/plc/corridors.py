@@ -14,12 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Layout, Mode
-from factory.floor.layout.coordinating import Coordinated
-from factory.floor.layout.exclusions import awaited_positions
-from factory.floor.layout.staying import Staying, Sweep
+from factory.api import LayoutMachines, Mode, Past, Timing
 from factory.support.arrays import Array
-from factory.theory.nets.coordinated import Past
 
 SLACK = 1e-3
 """An axis is where it has to be within this [m]."""
@@ -29,6 +25,10 @@ AWAY = 0.005
 
 SOON = 0.01
 """An axis that is let go on by a tick stops so much further at most [m]."""
+
+
+Sweep = tuple[tuple[float, float], tuple[float, float]]
+"""From where to where a robot's carriage goes, and its lift [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,14 +41,15 @@ class WayPart:
 
 
 class Corridors:
-    """The corridors of a `layout` in its coordinated `net`, with the modes of its operations."""
+    """The corridors of a timed layout in its coordinated net, with the modes of its operations."""
 
-    def __init__(self, layout: Layout, net: Coordinated, modes: Sequence[Mode]) -> None:
-        self._factory, self._modes = layout.factory, modes
+    def __init__(self, timing: Timing) -> None:
+        layout, net = timing.layout, timing.coordinated
+        self._factory, self._modes = layout.factory, timing.modes
         self._least, self._most = np.array(layout.spans).T
         ended = {int(place): past for past, (place, _) in net.passes.items()}
         self._ways = dict[tuple[int, int], list[WayPart]]()
-        for presence in Staying(layout, net, awaited_positions(layout)).presences():
+        for presence in LayoutMachines(layout).robot_presences(net):
             ends = tuple(ended[place] for place in presence.places[1:] if place in ended)
             key = presence.robot, presence.places[0]
             self._ways.setdefault(key, []).append(WayPart(ends, presence.sweeps))

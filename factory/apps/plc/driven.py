@@ -4,7 +4,6 @@ refuses forbidden commands."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +12,6 @@ from factory.api import Event, Factory, Limits, Operation, Settings
 from factory.apps.plc.corridors import SLACK
 from factory.apps.plc.interlock import PlantInterlock
 from factory.apps.plc.signals import NOBODY, AxisDrives, Commands, Controller, Refusal, Sensed
-from factory.engine.simulation.active import Active
-from factory.engine.simulation.ordering import Ordering
-from factory.engine.timing.distributed import Scan
 from factory.support.arrays import Array
 
 if TYPE_CHECKING:
@@ -37,6 +33,7 @@ class DrivenSupervisor:
         scan: float,
     ) -> None:
         self.interlock, self._controller = interlock, controller
+        self.ordering = interlock.ordering
         self.tripped, self._astray = False, set[int]()
         self._steps, self._period = settings.steps, max(1, round(scan / settings.step))
         self._look = min(self._period, settings.steps)
@@ -47,11 +44,6 @@ class DrivenSupervisor:
     def factory(self) -> Factory:
         """The driven factory."""
         return self.interlock.factory
-
-    @property
-    def ordering(self) -> Ordering:
-        """The order places that are enforced."""
-        return self.interlock.ordering
 
     @property
     def events(self) -> list[Event]:
@@ -69,9 +61,9 @@ class DrivenSupervisor:
         return self.interlock.marked
 
     @property
-    def active(self) -> Active:
-        """The operations under way."""
-        return Active(tuple(o.index for o in self.factory.operations if self.marked[o.place]))
+    def under_way(self) -> tuple[int, ...]:
+        """The operations (index) under way."""
+        return tuple(o.index for o in self.factory.operations if self.marked[o.place])
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
@@ -125,7 +117,7 @@ class DrivenSupervisor:
         self.interlock.refusals.add(Refusal(self.interlock.world.time, NOBODY, message))
 
     @property
-    def scans(self) -> Sequence[Scan]:
+    def scans(self) -> tuple[()]:
         """None: what the controller does is not known before."""
         return ()
 
@@ -175,8 +167,7 @@ class DrivenSupervisor:
 
 def drive(simulation: Simulation, controller: Controller, scan: float) -> DrivenSupervisor:
     """Let a controller drive the plant of a simulation from the start, asked every `scan` [s]."""
-    net, settings = simulation.timing.coordinated, simulation.request.settings
-    interlock = PlantInterlock(simulation.layout, simulation.modes, simulation.world, net)
+    settings, interlock = simulation.request.settings, PlantInterlock(simulation)
     driven = DrivenSupervisor(interlock, simulation.limits, settings, controller, scan)
     simulation.supervisor = driven
     return driven

@@ -4,41 +4,30 @@ know how it decides."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from factory.api import NOPART, Event, Layout, Mode, Operation, World
+from factory.api import NOPART, Event, Mode, Operation, Simulation
 from factory.apps.plc.corridors import Corridors
 from factory.apps.plc.signals import Commands, GripStates, Refusal, Refusals
-from factory.engine.simulation.ordering import Ordering
-from factory.floor.layout.coordinating import Coordinated
 from factory.support.arrays import Truth
-from factory.theory.control.mode import REST
-from factory.theory.nets.threaded import Threads
 
 REACH = 1e-3
 """Greatest distance of an axis from where parts change hands at which a grip takes a part [m]."""
 
 
 class PlantInterlock:
-    """Carries out commands in a `world`. It fires X_s when the carrier of X takes the job up, and
-    X_e when it gives it up. `net`: the coordinated net of the layout; `corridors`: where axes may
-    go; `fired`: firing counts of the transitions; `held_back`: robots that stand because their last
-    command is refused; `refusals`: the refused commands."""
+    """Carries out commands in the world of a simulation that has not begun. It fires X_s when the
+    carrier of X takes the job up, and X_e when it gives it up. `ordering`: the order places that it
+    keeps; `corridors`: where axes may go; `fired`: firing counts of the transitions; `held_back`:
+    robots that stand because their last command is refused; `refusals`: the refused commands."""
 
-    def __init__(
-        self,
-        layout: Layout,
-        modes: Sequence[Mode],
-        world: World,
-        net: Coordinated,
-    ) -> None:
+    def __init__(self, simulation: Simulation) -> None:
+        layout, world = simulation.layout, simulation.world
         self.factory, self.world = layout.factory, world
-        self.ordering, self.corridors = Ordering(net.orders), Corridors(layout, net, modes)
-        self._goals = [mode.goals for mode in modes]
+        self.ordering, self.corridors = simulation.supervisor.ordering, Corridors(simulation.timing)
+        self._goals = [mode.goals for mode in simulation.modes]
         gears, starts = layout.factory.net, [o.start for o in layout.factory.operations]
-        self.threads = Threads(gears.threaded, gears.threads_of(gears.initial_marking), starts)
+        self.threads = gears.threads(gears.initial_marking, starts)
         self.fired = [0] * len(gears.threaded.transitions)
         self.events: list[Event] = []
         self.refusals = Refusals()
@@ -244,7 +233,7 @@ class PlantInterlock:
         axes = self.factory.moves[operation.index]
         speeds = np.abs(self.world.sense()[1][list(axes)])
         worst = int(speeds.argmax())
-        if speeds[worst] <= REST:
+        if speeds[worst] <= Mode.REST:
             return ""
         robot = self.factory.robots[self.factory.robot_of(axes[worst])].name
         return f"{robot} still moves at {1000 * float(speeds[worst]):.0f} mm/s"

@@ -26,11 +26,9 @@ from factory.apps.deviations.injector import FaultInjector, Hit
 from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
 from factory.apps.recovery.responding import RecoveryPolicy
-from factory.apps.recovery.standing import patience
-from factory.engine.record.failures import Stood
+from factory.apps.recovery.standing import Stood, patience
 from factory.engine.simulation.supervisor import Supervisor
 from factory.support.tables import table_of
-from factory.theory.problem.template import Failure
 
 IN_VAIN = 2.0
 """Nothing more will happen when nothing fires for so many times the longest delay of all."""
@@ -147,16 +145,17 @@ class Recovery:
         if not operation.inputs and not self.plant.offers(operation.label):
             return False
         for failure in operation.template.failures if operation.inputs else ():
-            if self._fails(failure, operation):
+            if self._fails(failure.test, failure.limit or 0.0, operation):
                 self.pending[operation.index] = failure.test
                 return False
         self.responding.passed(operation)
         return True
 
-    def _fails(self, failure: Failure, operation: Operation) -> bool:
-        if failure.test == "residual":
-            return self.plant.residual(operation) > (failure.limit or 0.0)
-        if failure.test == "rejected":
+    def _fails(self, test: str, limit: float, operation: Operation) -> bool:
+        """Whether an operation fails a test, with a limit [m]."""
+        if test == "residual":
+            return self.plant.residual(operation) > limit
+        if test == "rejected":
             return self.plant.rejects(operation.carrier)
         return False
 

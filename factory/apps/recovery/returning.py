@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.api import Layout, Marking, Mode, Operation, start_positions
+from factory.api import Layout, LayoutMachines, Marking, Mode, Operation
 from factory.engine.simulation.supervisor import Supervisor
-from factory.floor.layout.feeding import passing
 from factory.support.arrays import Array
 
 Goal = tuple[int, float]
@@ -113,7 +112,7 @@ class ReturnMotion:
         layout, gear = self._layout, self._layout.factory.net.gears[robot]
         marking = self._without_skipped(robot, marking)
         step, _ = gear.step_in(marking)
-        at, lift = start_positions(layout, marking), layout.factory.up(robot)
+        at, lift = LayoutMachines(layout).starts(marking), layout.factory.up(robot)
         goals = [(robot, _waiting(layout, robot, step))]
         if lift is None:
             return goals
@@ -162,7 +161,7 @@ def _waiting(layout: Layout, robot: int, step: int) -> float:
 def _aside(layout: Layout, leaf: Operation) -> float:
     """Where the robot of a feeder is clear of the presented part [m]."""
     at = layout.guidepaths[leaf.carrier].length
-    return max(0.0, at - passing(layout, leaf) - PAST)
+    return max(0.0, at - LayoutMachines(layout).passing(leaf) - PAST)
 
 
 def _highest(layout: Layout, robot: int) -> float:

@@ -7,9 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.api import Limits, Mode, Operation, Simulation
-from factory.engine.record.failures import Stood
 from factory.engine.simulation.supervisor import Supervisor
-from factory.theory.control.mode import STILL
 from factory.theory.control.navigation import Bundle
 
 SLOWEST = 1e-9
@@ -25,6 +23,10 @@ MOVES = 5e-3
 def patience(seconds: float) -> float:
     """The time [s] after which something is late that should take so many `seconds`."""
     return SLUGGISH * seconds + GRACE
+
+
+Stood = tuple[float, tuple[str, ...]]
+"""A time [s], and the names of the robots that stand from then on."""
 
 
 class MotionHold:
@@ -114,7 +116,7 @@ class MotionHold:
         x, v = simulation.world.sense()
         bundle = Bundle.of([mode], [self._limits.of(axes)])
         asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
-        stuck = asked & (np.abs(v[axes]) < STILL)
+        stuck = asked & (np.abs(v[axes]) < Mode.STILL)
         of_axis = dict[int, int]()
         for robot, axes_of in enumerate(self._axes):
             of_axis |= dict.fromkeys(axes_of, robot)

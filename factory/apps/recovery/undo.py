@@ -18,7 +18,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 
-from factory.api import GearNet, MarkedNet, Marking, marked
+from factory.api import GearNet, MarkedNet, Marking
 
 
 def undo(
@@ -37,12 +37,12 @@ def undo(
     least = Counter(asked)
     if not least:
         raise ValueError("no transition is asked to be undone")
-    return _greatest(marked(net), fired, least, joins)
+    return _greatest(MarkedNet.of(net), fired, least, joins)
 
 
 def tokens_after(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...]:
     """m_0 + C n: the number of tokens of each place, negative where the counts lead nowhere."""
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     pairs = zip(subject.tokens, subject.net.places, strict=True)
     return tuple(
         tokens + sum(fired[e] for e in place.left) - sum(fired[e] for e in place.right)

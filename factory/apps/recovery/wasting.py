@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from factory.api import NOPART, Operation
-from factory.theory.problem.template import Kind
 
 
 @dataclass(slots=True)
@@ -18,7 +17,7 @@ class OnEnd:
     tried: Counter[int] = field(default_factory=Counter)
     scrapped: Counter[str] = field(default_factory=Counter)
 
-    def response(self, operation: Operation, test: str) -> Kind:
+    def response(self, operation: Operation, test: str) -> str:
         """The response of the template to a failure of an operation repeated so many times."""
         failure, tried = operation.template.failure(test), self.tried[operation.index]
         responses = failure.responses if failure else ()

@@ -12,15 +12,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from factory.api import Factory, Hand, Layout, carriers
+from factory.api import Dimensions, Factory, Hand, Hands, Layout, LayoutSearch
 from factory.apps.relay.lanes import HoldingInLanes, InTheWayInLanes, Lane
-from factory.floor.layout.hands.holding import held
-from factory.floor.layout.hands.kinds import BELOW
-from factory.floor.layout.hands.one_hand import OneHand
-from factory.floor.layout.hands.places import Places, centre_of
-from factory.floor.layout.hands.tips import STRONG
 from factory.support.boxes import Point2
-from factory.theory.problem.robot_bodies import ARM_WIDTH
 
 InLine = tuple[tuple[Hand | None, ...], set[int]]
 """The hands of a factory with relays, and the robots (of the factory without) whose lanes are
@@ -41,7 +35,7 @@ def hands_in_line(
     cut = {robot for pieces in lines.values() for robot in pieces}
     settled = [None if robot in cut else before.hand(old) for robot, old in enumerate(origins)]
     choice = _Choice(before, HoldingInLanes(before, factory, origins, cut, relays), settled)
-    on, turned = carriers(before.factory), set[int]()
+    on, turned = LayoutSearch(before.factory, before.product).carriers, set[int]()
     for old in sorted(lines, key=lambda robot: _depth(on, robot)):
         if choice.settle(old, on[old], lines[old]) < 0:
             turned.add(old)
@@ -75,10 +69,10 @@ class _Choice:
             return 1
         tried = []
         for way in (1, -1):
-            hands = self._hands(old, carrier, pieces, way, max(STRONG, before.share))
+            hands = self._hands(old, carrier, pieces, way, max(Hand.STRONG, before.share))
             lacking = sum(not hand.kind.holds for hand in hands.values())
             tried.append((lacking, max(hand.share for hand in hands.values()), way, hands))
-            if not lacking and tried[-1][1] <= STRONG:
+            if not lacking and tried[-1][1] <= Hand.STRONG:
                 break
         _, _, way, hands = min(tried, key=lambda attempt: attempt[:2])
         for robot, hand in hands.items():
@@ -118,11 +112,11 @@ class _Choice:
         at, radius = np.array(before.places), np.full(len(before.places), before.radius)
         self.in_the_way.apart.kept[guest] = before
         free = self.in_the_way.apart.own_side(
-            guest, before.kind, Places(at, radius, radius, radius, radius), u, t
+            guest, before.kind, Hands.Sites(at, radius, radius, radius, radius), u, t
         )
         if free.all():
             return before
-        return self._below(guest, [(u, side) for side in sides], max(STRONG, before.share))
+        return self._below(guest, [(u, side) for side in sides], max(Hand.STRONG, before.share))
 
     def _lane(self, old: int, carrier: int, pieces: Sequence[int], side: int) -> Lane:
         """A lane to one side (of the guidepath's own) of a robot's guidepath. What the robots hold
@@ -131,20 +125,18 @@ class _Choice:
         toward = layout.guidepaths[carrier].heading if carrier >= 0 else (0.0, 1.0)
         across, way = (0 if path.side[0] else 1), round(path.side[0] + path.side[1])
         under = float(layout.product.middle[across]) + path.offset * way
-        parts = self.holding.factory.contents[held(self.holding.factory, pieces[-1])]
-        middle = float(centre_of(layout.product, parts)[1][across])
+        middle = float(self.holding.centre(self.holding.held(pieces[-1]))[across])
         c = self.holding.clearance
-        room = c.spread - ARM_WIDTH / 2 - c.c / 2
+        room = c.spread - Dimensions.ARM_WIDTH / 2 - c.c / 2
         line = min(max(middle, under - room), under + room)
         return Lane(path.heading, toward, line, side * way)
 
     def _below(self, robot: int, frames: Sequence[tuple[Point2, Point2]], most: float) -> Hand:
         """The best hand from below of a robot, using at most a given share of its strength; of the
         kind `none` if there is none."""
-        label = held(self.holding.factory, robot)
-        hands = OneHand(self.in_the_way).of_kind(BELOW, [robot], frames)
+        label = self.holding.held(robot)
+        hands = Hands.Choice(self.in_the_way).of_kind(Hand.BELOW, [robot], frames)
         if hands and hands[0].share <= most:
             return hands[0]
-        parts = self.holding.factory.contents[label]
-        x, y, z = centre_of(self.holding.product, parts)[1].tolist()
+        x, y, z = self.holding.centre(label).tolist()
         return Hand.nothing((x, y, z), most)

@@ -4,18 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from factory.api import Clearance, Factory, Hand, Layout, Operation
-from factory.floor.layout.dimensions import FINGER
-from factory.floor.layout.hands.apart import BESIDE, HandsApart, Swept
-from factory.floor.layout.hands.holding import Holding, held
-from factory.floor.layout.hands.in_the_way import InTheWay, Passed
-from factory.floor.layout.hands.kinds import HandKind
-from factory.floor.layout.hands.places import Places
-from factory.floor.layout.hands.reach import widths
-from factory.floor.layout.hands.surfaces import swept
+from factory.api import Dimensions, Factory, Hand, Hands, Layout, LayoutSearch, Operation
 from factory.support.arrays import Array, Truth
 from factory.support.boxes import Point2
 
@@ -37,6 +30,13 @@ class Lane:
         return 1 if self.heading[0] else 0
 
 
+Kind: TypeAlias = Hands.Kind
+Places: TypeAlias = Hands.Sites
+
+Swept = tuple[Array, Array, Array]
+"""Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the
+way [m]."""
+
 SAME = 1e-5
 """Places that are no further apart across are on one line [m]."""
 
@@ -44,9 +44,9 @@ NOTHING = Hand.nothing((0.0, 0.0, 0.0))
 """Where there is no hand."""
 
 
-class HoldingInLanes(Holding):
-    """As `Holding`; no robot comes to a hand-over in line. `cut`: the robots that run on a piece of
-    a guidepath."""
+class HoldingInLanes(Hands.Held):
+    """As `Hands.Held`; no robot comes to a hand-over in line. `cut`: the robots that run on a piece
+    of a guidepath."""
 
     def __init__(
         self,
@@ -57,7 +57,8 @@ class HoldingInLanes(Holding):
         relays: Collection[int],
     ) -> None:
         super().__init__(factory, before.product)
-        self.relays, self.clearance = relays, Clearance(before.clearance, before.factory.carriage)
+        self.relays = relays
+        self.clearance = LayoutSearch(before.factory, before.product, before.clearance).size
         self.origins, self.cut = origins, cut
         self.headings = [before.guidepaths[old].heading for old in origins]
         for robot in cut:
@@ -75,8 +76,8 @@ class HoldingInLanes(Holding):
         return self.factory.robots[robot].operations[0] in self.relays
 
 
-class HandsApartInLanes(HandsApart):
-    """As `HandsApart`, for robots in lanes, and for those whose hands are chosen anew on the line
+class HandsApartInLanes(Hands.Apart):
+    """As `Hands.Apart`, for robots in lanes, and for those whose hands are chosen anew on the line
     of the one that was `kept`."""
 
     holding: HoldingInLanes
@@ -90,16 +91,16 @@ class HandsApartInLanes(HandsApart):
         super().__init__(holding, hand_of)
         self.lanes, self.kept = lanes, dict[int, Hand]()
 
-    def own_side(self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2) -> Truth:
+    def own_side(self, robot: int, kind: Kind, places: Places, u: Point2, t: Point2) -> Truth:
         if robot in self.kept:
             kept, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(places.at[:, across] - kept.places[0][across]) < SAME
-            free &= places.radius <= max(kept.radius, FINGER / 2) + SAME
+            free &= places.radius <= max(kept.radius, Dimensions.FINGER / 2) + SAME
             return free & super().own_side(robot, kind, places, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
-        wide = widths(places.radius) / 2
+        wide = self.widths(places) / 2
         away = (places.at[:, lane.across] - lane.line) * lane.side
-        free = (away - wide >= c.c / 2) & (away - places.radius >= BESIDE)
+        free = (away - wide >= c.c / 2) & (away - places.radius >= self.BESIDE)
         free &= away + wide <= c.spread + c.carriage / 2
         if self.holding.gives(robot):
             return free
@@ -111,14 +112,14 @@ class HandsApartInLanes(HandsApart):
         return super().crossing(robot, places, u, t)
 
     def carriers_hand(
-        self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2
+        self, robot: int, kind: Kind, places: Places, u: Point2, t: Point2
     ) -> Iterator[Swept]:
         if not self.holding.gives(robot):
             yield from super().carriers_hand(robot, kind, places, u, t)
 
 
-class InTheWayInLanes(InTheWay):
-    """As `InTheWay`, for robots in lanes; `settled`: hands chosen already."""
+class InTheWayInLanes(Hands.Obstacles):
+    """As `Hands.Obstacles`, for robots in lanes; `settled`: hands chosen already."""
 
     holding: HoldingInLanes
     apart: HandsApartInLanes
@@ -133,7 +134,7 @@ class InTheWayInLanes(InTheWay):
         self.apart = HandsApartInLanes(holding, lanes, hand_of)
 
     def possible(
-        self, robot: int, label: str, kind: HandKind, frames: Sequence[tuple[Point2, Point2]]
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Point2, Point2]]
     ) -> bool:
         """Always true: a lane has two ends."""
         return True
@@ -142,7 +143,7 @@ class InTheWayInLanes(InTheWay):
         self,
         robot: int,
         label: str,
-        kind: HandKind,
+        kind: Kind,
         places: Places,
         frames: Sequence[tuple[Point2, Point2]],
     ) -> tuple[dict[str, Truth], Truth]:
@@ -150,29 +151,29 @@ class InTheWayInLanes(InTheWay):
         return self._looked_at(robot, label, kind, places, frames)
 
     def _passing(
-        self, robot: int, label: str, kind: HandKind, places: Places, u: Point2, t: Point2
-    ) -> Passed:
+        self, robot: int, label: str, kind: Kind, places: Places, u: Point2, t: Point2
+    ) -> Hands.Contacts:
         return self._looked_past(robot, label, kind, places, u, t)
 
-    def _going_on(self, robot: int, kind: HandKind, places: Places, u: Point2, t: Point2) -> Array:
+    def _going_on(self, robot: int, kind: Kind, places: Places, u: Point2, t: Point2) -> Array:
         if self.holding.gives(robot):
             return np.zeros(len(places))
         return super()._going_on(robot, kind, places, u, t)
 
-    def _leaving(self, robot: int, kind: HandKind, places: Places, u: Point2) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: Kind, places: Places, u: Point2) -> Iterator[Swept]:
         """Also the sweep of a hand as it comes to take over, from ahead."""
         low, high = self.reach(kind, places, u)
         if self.holding.takes(robot):
-            label = held(self.holding.factory, robot)
-            yield (*swept(low, high, u), self.holding.boxes(label))
+            label = self.holding.held(robot)
+            yield (*self.apart.swept(low, high, u), self.holding.boxes(label))
         if self.holding.gives(robot):
-            last = held(self.holding.factory, robot, at_last=True)
-            yield (*swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
+            last = self.holding.held(robot, at_last=True)
+            yield (*self.apart.swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
         else:
             yield from super()._leaving(robot, kind, places, u)
 
     def coming(
-        self, robot: int, label: str, kind: HandKind, places: Places, u: Point2, t: Point2
+        self, robot: int, label: str, kind: Kind, places: Places, u: Point2, t: Point2
     ) -> Iterator[Swept]:
         if not self.holding.takes(robot):
             yield from super().coming(robot, label, kind, places, u, t)

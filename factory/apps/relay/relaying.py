@@ -12,23 +12,20 @@ from dataclasses import dataclass, replace
 
 from factory.api import (
     NOPART,
-    Clearance,
     Ground,
     Hands,
     Layout,
+    LayoutMachines,
+    LayoutSearch,
     Pace,
     Robot,
     Settings,
     all_templates,
-    certified,
-    certify,
     load_catalogue,
     pace,
 )
 from factory.apps.relay.splitting import origin_of, split
 from factory.apps.relay.ways import Way, ways
-from factory.floor.layout.optimising import optimised
-from factory.floor.layout.outfeed import away
 from factory.support.boxes import Point2
 from factory.support.collector import collector_paused
 
@@ -95,7 +92,7 @@ def _relayed(room: Room, settings: Settings, cycle: float | None) -> Layout:
         search = again
     if not search.seconds(search.found) < search.seconds(plain):
         return plain
-    return replace(certified(search.found, room.floor), plain=plain)
+    return replace(LayoutMachines(search.found).certified(room.floor), plain=plain)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +107,8 @@ class Room:
     def layout(self, wide: Collection[int]) -> Layout:
         """The layout with room for two lanes on the guidepaths of these robots."""
         plain = self.plain
-        c = Clearance(plain.clearance, plain.factory.carriage)
-        return optimised(plain.factory, plain.product, c, self.pace, self.floor, wide, self.hands)
+        where = plain.factory, plain.product, plain.clearance
+        return LayoutSearch(*where, self.pace, self.hands).best(self.floor, wide)
 
     def cuttable(self) -> set[int]:
         """The robots with a way that can be cut if all of these have room for it."""
@@ -161,7 +158,11 @@ class _Search:
         seconds = self.pace.gear_times(layout)
         dropoff = layout.factory.dropoff.index
         way = layout.home(0, dropoff) - layout.visits[dropoff, 0].at
-        outfeed = self.pace.rest(way) + self.pace.lost + away(layout, self.settings)
+        outfeed = (
+            self.pace.rest(way)
+            + self.pace.lost
+            + LayoutMachines(layout).outfeed_time(self.settings)
+        )
         seconds[0] = max(seconds[0], outfeed)
         return seconds
 
@@ -189,7 +190,9 @@ class _Search:
             for number, hand in enumerate(hands)
             if hand is not None and not hand.kind.holds and hand not in none
         }
-        return held or {name for fault in certify(self.found).faults for name in fault.robots}
+        return held or {
+            name for fault in LayoutMachines(self.found).certify().faults for name in fault.robots
+        }
 
     def forbid(self, robots: Collection[str]) -> None:
         """Exclude the ways of which one of these robots (by name) has a piece; if there are none,

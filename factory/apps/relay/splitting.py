@@ -9,20 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from factory.api import (
-    NOPART,
-    Catalogue,
-    Clearance,
-    Factory,
-    Guidepath,
-    Layout,
-    Template,
-    payload_boxes,
-)
+from factory.api import NOPART, Catalogue, Factory, Guidepath, Layout, LayoutSearch, Node, Template
 from factory.apps.relay.in_line import InLine, hands_in_line
 from factory.apps.relay.ways import Way
-from factory.floor.layout.visits import visits_of
-from factory.theory.compiler.expanding import RELAY, relay_label
 from factory.theory.compiler.relays import with_relays
 
 
@@ -48,11 +37,11 @@ def split(
     factory = with_relays(before, numbers, templates, catalogue)
     cut = {r: list(_pieces(layout, r, ways, factory)) for r in range(len(before.robots))}
     hands, turned = _hands(layout, factory, cut)
-    c = Clearance(layout.clearance, factory.carriage)
+    search = LayoutSearch(factory, layout.product, layout.clearance)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
     for robot, pieces in cut.items():
-        spread = c.spread * (-1 if robot in turned else 1)
+        spread = search.size.spread * (-1 if robot in turned else 1)
         for number, piece in enumerate(reversed(pieces)):
             lane = spread * (-1) ** number if len(pieces) > 1 else 0.0
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
@@ -67,9 +56,9 @@ def split(
         layout,
         factory=factory,
         guidepaths=guidepaths,
-        visits=visits_of(factory, guidepaths, stations),
+        visits=search.visits(guidepaths, stations),
         hands=hands,
-        payloads=payload_boxes(factory, layout.product),
+        payloads=search.payloads,
         certificate=None,
     )
 
@@ -98,7 +87,7 @@ def _pieces(
             continue
         for relay, cut in enumerate(ways[label].cuts(factory.plan.relays[label])):
             yield Piece(chosen, start, cut)
-            start, chosen = cut, factory.by_label[relay_label(label, relay)].carrier
+            start, chosen = cut, factory.by_label[Node.relay_label(label, relay)].carrier
     yield Piece(chosen, start, layout.guidepaths[robot].travel)
 
 
@@ -118,4 +107,4 @@ def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
 def origin_of(label: str) -> str:
     """Label before hand-overs."""
     origin, _, last = label.rpartition("/")
-    return origin if last.startswith(RELAY) else label
+    return origin if last.startswith(Node.RELAY) else label

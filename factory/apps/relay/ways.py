@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from math import floor, inf
 
-from factory.api import NOPART, Layout
+from factory.api import NOPART, Dimensions, Layout
 from factory.support.decimals import up
-from factory.theory.problem.robot_bodies import MAST
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +61,7 @@ def ways(layout: Layout) -> dict[str, Way]:
 
 def _ways(layout: Layout, robot: int) -> Iterator[Way]:
     path, c = layout.guidepaths[robot], layout.clearance
-    lanes = max(layout.factory.carriage, path.reach - path.arm + MAST / 2)
+    lanes = max(layout.factory.carriage, path.reach - path.arm + Dimensions.MAST / 2)
     at = [round(path.length - stop, 3) for stop in layout.stops(robot)]
     piles = _piles(layout, robot)
     fronts = [-inf, *(front for _, _, front in piles)]

@@ -7,11 +7,9 @@ from html import escape
 
 import numpy as np
 
-from factory.api import Finder, Node, Operation, Product
+from factory.api import Approach, Finder, Node, Operation, Product
 from factory.apps.drawing.tables import alike, differing, table
 from factory.apps.report.recording import Recording
-from factory.theory.compiler.expanding import nodes_of
-from factory.theory.plant.approaches import Approach
 
 COLUMNS = ("Operation", "Inputs", "Approach", "Clearance on approach", "Excluded")
 
@@ -61,7 +59,7 @@ def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str,
     """The clearance on each approach by label; empty where the meshes are missing."""
     if recording.layout is None:
         return {}
-    return rooms(nodes_of(recording.factory), recording.layout.product, chosen)
+    return rooms(Node.of_factory(recording.factory), recording.layout.product, chosen)
 
 
 def _cells(

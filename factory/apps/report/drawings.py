@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.api import Factory, Geoms, Operation, marked, names
+from factory.api import Factory, Geoms, MarkedNet, Operation, names
 from factory.apps.drawing.canvas import Canvas, Point, hexadecimal, hull, millimetres
 from factory.apps.exports.svg import NetDrawing
 from factory.apps.report.scene import DrawnFactory, owner, placed, stands_for
@@ -154,9 +154,8 @@ MOVES = {"arm": "arm", "finger": "arm", "carriage": "carriage"}
 def net_drawing(factory: Factory, roles: Sequence[str]) -> str:
     """The net as SVG, to be put into a page; what belongs to one robot has the style of its
     role."""
-    drawing = NetDrawing(
-        marked(factory.net), lambda gears: roles[gears[0]] if len(gears) == 1 else "shared", True
-    )
+    net = MarkedNet.of(factory.net)
+    drawing = NetDrawing(net, lambda of: roles[of[0]] if len(of) == 1 else "shared", True)
     size = {"data_width": round(drawing.page[1]), "data_height": round(drawing.page[3])}
     return drawing.canvas.embedded("net", drawing.page, **size, aria_label="The net")
 

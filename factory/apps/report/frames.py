@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.api import HIDDEN, names
+from factory.api import Model, names
 from factory.apps.exports import motion
 from factory.apps.report.recording import Recording
 from factory.apps.report.scene import Pack
@@ -47,7 +47,7 @@ def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
     return {
         "count": len(kept),
         "units": UNITS,
-        "hidden": HIDDEN,
+        "hidden": Model.HIDDEN,
         "moving": moving,
         "turning": turning,
         "parents": {str(b): int(p) for b, p in enumerate(m.body_parentid) if p and b},

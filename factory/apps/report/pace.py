@@ -7,12 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.api import Event, RunVerdict, Timing, Undone, names
+from factory.api import Event, Run, RunVerdict, Timing, Undone, names
 from factory.apps.analyze.measured import conditions, dropoff_times, operation_times
 from factory.apps.analyze.timed import flow, timed_net
 from factory.apps.monitor.recount import worst
 from factory.apps.report.recording import Recording
-from factory.engine.simulation.run import busy_times, mean_interval
 
 
 def fidelity(recording: Recording) -> dict[str, float | None]:
@@ -74,10 +73,10 @@ def measured(recording: Recording) -> MeasuredPace:
     dropoffs = dropoff_times(log.time, log.delivered)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
     events = (e if isinstance(e, Undone) else Event(t, e) for t, e in log.timed_entries)
-    busy, total = busy_times(factory, events), recording.end
+    busy, total = Run.busy_times(factory, events), recording.end
     return MeasuredPace(
         dropoffs,
-        mean_interval(dropoffs, factory.period),
+        Run.mean_interval(dropoffs, factory.period),
         tuple(durations),
         tuple(spent / (total or 1.0) for spent in busy),
         tuple(gears),

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from math import comb
 
-from factory.api import PAG, CutOff, Diagnostic, Factory, steady_from
+from factory.api import PAG, CutOff, Diagnostic, Factory, Run
 from factory.apps.drawing.tables import table
 from factory.apps.fidelity.record import QUANTITIES
 from factory.apps.report.drawings import words_of
@@ -106,7 +106,7 @@ def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str
     if plan is None:
         note = f'<p class="doubt">No prediction: {escape(recording.missing)}.</p>'
     elif run.cycle is None:
-        least = steady_from(recording.factory.period)
+        least = Run.steady_from(recording.factory.period)
         note = f'<p class="note">A cycle time is measured from {least} products on.</p>'
     return table(names, body) + note + _gears(recording, run, plan)
 

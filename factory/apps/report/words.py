@@ -6,9 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from factory.api import Factory, Verdict, listing, verify
+from factory.api import Factory, Verdict, verify
 from factory.apps.exports.certificate.check import check_certificate
 from factory.apps.exports.certificate.writer import certificate
+from factory.support.errors import listing
 
 NAMES = {
     "gear_net": "Gear net",

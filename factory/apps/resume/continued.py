@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from io import FileIO
 
-from factory.api import Diagnostic, Entry, Event, InputError, Recordable, Recorder, State, Undone
+from factory.api import Diagnostic, Event, InputError, Recordable, Recorder, State, Undone
 from factory.apps.log.blocks import blocks
 from factory.apps.log.content import AGAIN, Content
 from factory.apps.log.reader import Log, header_in
@@ -112,7 +112,7 @@ class Continued(Recorder):
         (self.writer or self.file).close()
 
 
-def _fired(entry: tuple[float, Entry] | None) -> str:
+def _fired(entry: tuple[float, str | Undone] | None) -> str:
     """An event in words."""
     if entry is None:
         return "no more events"

@@ -28,7 +28,6 @@ from factory.apps.log.checks import HEADER
 from factory.apps.log.project_table import project_of, settings_of
 from factory.apps.log.reader import digest_of
 from factory.apps.log.writer import packed, versions
-from factory.engine.mjcf.reservations import reservations_of
 from factory.support.tables import misfit, value_of
 
 TAG = re.compile(r"<[^>]+>")
@@ -139,7 +138,7 @@ def _unsaid(log: Log, made: Simulation) -> list[Diagnostic]:
     if log.figures is None:
         return faults
     right = [(fault.code, fault.message) for fault in made.model.overlaps]
-    doubts = [*reservations_of(made.layout, made.model.excluded)]
+    doubts = [*made.model.reservations]
     unlike = [f"the log does not say: {fault.message}" for fault in faults[:1]]
     unlike += [
         f"the log says what is not so: {words}"

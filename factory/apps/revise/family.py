@@ -13,7 +13,6 @@ from pathlib import Path
 
 from factory.api import PAG, Assembly, Diagnostic, InputError
 from factory.apps.revise.matching import Matching, below, matching, shifted
-from factory.theory.problem.pag import Mix
 
 Renamed = dict[str, str]
 """What the labels of a product are called in the family."""
@@ -60,11 +59,11 @@ def family(one: PAG, other: PAG, counts: tuple[int, int], folder: Path) -> Famil
         for node in moved.nodes
         if node.label not in labels
     ]
-    mix = Mix(((one.root, counts[0]), (names[other.root], counts[1])))
     renamed = (replace(a, parts=tuple(names[part] for part in a.parts)) for a in other.allowed)
     allowed = (*one.allowed, *renamed)
     file = str(folder / "family.pag")
-    made = PAG(one.root, tuple(nodes), None, str(folder), file, tuple(dict.fromkeys(allowed)), mix)
+    every = PAG(one.root, tuple(nodes), None, str(folder), file, tuple(dict.fromkeys(allowed)))
+    made = every.mixed(((one.root, counts[0]), (names[other.root], counts[1])))
     return Family(made, names, common, matched)
 
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from factory.api import Layout, MarkedNet, coordinated
+from factory.api import Layout, LayoutMachines, MarkedNet
 from factory.apps.revise.pairing import Pairing
 from factory.support.boxes import Point2
 
@@ -34,7 +34,11 @@ class Inheritance:
     def of(cls, old: Layout, new: Layout, pairing: Pairing, shift: Point2) -> Inheritance:
         """What the certificate of a layout has from that of another. Both have one."""
         assert old.certificate is not None and new.certificate is not None, "both are certified"
-        names, net, held = Renaming(pairing), coordinated(new).net, dict[object, int]()
+        names, net, held = (
+            Renaming(pairing),
+            LayoutMachines(new).coordinated.net,
+            dict[object, int](),
+        )
         for number, entry in enumerate(old.certificate.apart.excluded):
             if is_circuit(net, names.of(entry.circuit)):
                 held[_key(names.of(entry.machines), names.of(entry.places))] = number

@@ -13,7 +13,6 @@ from factory.api import Demand, Project, Timing, write_pag
 from factory.apps.revise.family import family
 from factory.engine.timing.on_demand import cycle_of
 from factory.floor.layout.resting import on_demand
-from factory.theory.plant.demand import Word
 
 UNITS = 24
 """Number of units of one product from which its cycle time is taken."""
@@ -53,7 +52,7 @@ class LiveChange:
         timing = Timing(on_demand(self.both.layout), self.both.settings)
         sequence, cycles = timing.factory.sequence, dict[str, float]()
         for product in (self.old, self.new):
-            word = Word(sequence, Demand(changes=((product, 0),)), UNITS)
+            word = Demand(changes=((product, 0),)).word(sequence, UNITS)
             cycles[product] = cycle_of(timing, word).seconds
         return cycles
 

@@ -12,30 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 
-from factory.api import (
-    Certificate,
-    Clearance,
-    Factory,
-    Hands,
-    Layout,
-    Pace,
-    Product,
-    carriers,
-    certify,
-    payload_boxes,
-)
+from factory.api import Certificate, Layout, LayoutMachines, LayoutSearch
 from factory.apps.revise.pins import Pins
-from factory.floor.layout.branches import branch_of
 from factory.floor.layout.certificate import Fault
-from factory.floor.layout.crowding import crowding_faults
-from factory.floor.layout.dimensions import TOOL_TRAVEL
-from factory.floor.layout.drafting import LayoutDraft
-from factory.floor.layout.optimising import arrange, shape_of
-from factory.floor.layout.packing import Task
-from factory.floor.layout.shapes import Shape, headings
-from factory.floor.layout.sides import admissible
-from factory.floor.layout.stops import carried
-from factory.floor.layout.stretching import Stretched
 from factory.support.decimals import up
 
 STEP = 0.02
@@ -91,20 +70,10 @@ class _Seen:
 class Pinning:
     """Lays out a factory with `pins`."""
 
-    def __init__(
-        self,
-        factory: Factory,
-        product: Product,
-        clearance: Clearance,
-        pace: Pace,
-        hands: Hands | None,
-        pins: Pins,
-    ) -> None:
-        self.factory, self.product, self.pins = factory, product, pins
-        self.names = {robot.name: robot.index for robot in factory.robots}
-        self.payloads, self.on = payload_boxes(factory, product), carriers(factory)
-        self.task = Task(factory, clearance, pace, [1.0] * len(self.on), hands=hands)
-        self._shapes: dict[tuple[int, ...], list[Shape]] = {}
+    def __init__(self, search: LayoutSearch, pins: Pins) -> None:
+        self.search, self.factory, self.pins = search, search.factory, pins
+        self.names = {robot.name: robot.index for robot in self.factory.robots}
+        self.on = search.carriers
         self._certificates: dict[Stretch, Certificate] = {}
         self.faults: tuple[Fault, ...] = ()
 
@@ -129,27 +98,27 @@ class Pinning:
 
     def _certificate(self, seen: _Seen) -> Certificate:
         if seen.stretch not in self._certificates:
-            self._certificates[seen.stretch] = certify(seen.layout)
+            self._certificates[seen.stretch] = LayoutMachines(seen.layout).certify()
         return self._certificates[seen.stretch]
 
     def _begun(self) -> _Seen:
         """The pinned values, and those of a packed layout for all else."""
-        free = arrange(self.task, self.payloads)[0].sides
+        free = self.search.packed().sides
         sides = {**free, **self.pins.sides}
         for o in self.factory.making:
             guests = [r for r in o.robots if r != o.carrier]
             if len(guests) == 2 and sides[guests[0]] == sides[guests[1]]:
                 loose = next((r for r in guests if r not in self.pins.sides), guests[1])
                 sides[loose] = -sides[loose]
-        return self._seen(self._packed(admissible(self.factory, sides)))
+        return self._seen(self._packed(self.search.admissible(sides)))
 
     def _packed(self, sides: dict[int, int]) -> Stretch:
-        pins, (packed, _) = self.pins, arrange(self.task, self.payloads, sides)
+        pins, packed = self.pins, self.search.packed(sides)
         robots = tuple(sides.get(robot, 0) for robot in range(len(self.on)))
-        shapes = self._shaped(robots)
+        least = self.search.least_travels(_sides(robots))
         travel = (
-            max(pins.travel.get(r, far), TOOL_TRAVEL if shape.tool else shape.least)
-            for r, (far, shape) in enumerate(zip(packed.travel, shapes, strict=True))
+            max(pins.travel.get(r, far), short)
+            for r, (far, short) in enumerate(zip(packed.travel, least, strict=True))
         )
         stations = (pins.stations.get(n, s) for n, s in enumerate(packed.stations))
         return Stretch(tuple(travel), tuple(stations), robots)
@@ -161,16 +130,16 @@ class Pinning:
             for robot in range(1, len(self.on))
             if robot not in self.pins.travel
             and self.on[robot] in self.pins.travel
-            and self.factory.last(robot).index != carried(self.factory, self.on[robot])[0]
+            and self.factory.last(robot).index != self.search.carried(self.on[robot])[0]
         ]
 
     def _placed(self, seen: _Seen, robot: int) -> _Seen:
         """The stretch with a new robot where it displaces fewest, after moves: of the best stations
         with a free path, and the best without."""
-        branch, clear, others = branch_of(self.on, robot), list[_Seen](), list[_Seen]()
+        branch, clear, others = self.search.branch(robot), list[_Seen](), list[_Seen]()
         for side in (-1, +1):
             sides = {r: s for r, s in enumerate(seen.stretch.sides) if r} | {robot: side}
-            if admissible(self.factory, sides) != sides:
+            if self.search.admissible(sides) != sides:
                 continue
             for stretch in self._stations(seen.stretch, sides, robot):
                 near = self._seen(stretch)
@@ -198,15 +167,15 @@ class Pinning:
         """A stretch with a new robot on a side, at stations all along its carrier's path, and
         beyond its ends."""
         packed, carrier = self._packed(sides), self.on[robot]
-        inside = branch_of(self.on, robot)
+        inside = self.search.branch(robot)
         travel = [packed.travel[r] if r in inside else t for r, t in enumerate(stretch.travel)]
-        carried_by = {n for r in inside for n in carried(self.factory, r)}
+        carried_by = {n for r in inside for n in self.search.carried(r)}
         stations = [
             packed.stations[n] if n in carried_by else s for n, s in enumerate(stretch.stations)
         ]
         count = ceil((travel[carrier] + BEYOND) / STEP)
         least = -ceil(BEYOND / STEP) if carrier else 0
-        made = carried(self.factory, carrier)
+        made = self.search.carried(carrier)
         for number in range(least, count):
             at, back = number * STEP, max(0.0, -number * STEP)
             moved, far = [*stations], [*travel]
@@ -261,7 +230,7 @@ class Pinning:
         """With a robot and those after it at later stations of their carrier, whose way from there
         is as long as it was, or shorter."""
         carrier, number = self.on[robot], self.factory.last(robot).index
-        made, travel = carried(self.factory, carrier), [*stretch.travel]
+        made, travel = self.search.carried(carrier), [*stretch.travel]
         stations = [*stretch.stations]
         for n in made:
             if n == number or stations[n] > stations[number]:
@@ -271,31 +240,19 @@ class Pinning:
         travel[carrier] = max(travel[carrier], max(stations[n] for n in made))
         return replace(stretch, travel=tuple(travel), stations=tuple(stations))
 
-    def _shaped(self, sides: tuple[int, ...]) -> list[Shape]:
-        if sides not in self._shapes:
-            frames = headings(self.factory, dict(enumerate(sides)))
-            both = enumerate(zip(self.on, frames, strict=True))
-            self._shapes[sides] = [
-                shape_of(self.task, self.payloads, robot, on, frame) for robot, (on, frame) in both
-            ]
-        return self._shapes[sides]
-
     def _seen(self, stretch: Stretch) -> _Seen:
         """A stretch with its layout and faults."""
-        sides = {robot: side for robot, side in enumerate(stretch.sides) if robot}
         far = (stretch.travel[0] + 1.0, *stretch.travel[1:])
-        draft = LayoutDraft(
-            self.factory,
-            self.product,
-            self.task.clearance,
-            self.payloads,
-            self._shaped(stretch.sides),
-            Stretched([*far], [*stretch.stations], sides),
-        )
-        layout = draft.layout(self.pins.travel[0])
-        faults = tuple(crowding_faults(layout))
+        lengths = far, stretch.stations, _sides(stretch.sides)
+        layout = self.search.drafted(*lengths, self.pins.travel[0])
+        faults = tuple(LayoutMachines(layout).crowding_faults)
         lacking = sum(fault.lacking or JAM for fault in faults)
         displaced = len(self.pins.ends) - len(self.pins.in_place(layout)[1])
         score = lacking + WEIGHT * displaced + LENGTH * layout.guidepath_length
-        score += TIME * self.task.pace.cycle_of(layout)
+        score += TIME * self.search.pace.cycle_of(layout)
         return _Seen(stretch, layout, faults, lacking, score)
+
+
+def _sides(of: tuple[int, ...]) -> dict[int, int]:
+    """The sides of robots (index) but the output robot, by their numbers."""
+    return {robot: side for robot, side in enumerate(of) if robot}

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from factory.api import Hand, Layout, Product, carriers
+from factory.api import Hand, Layout, LayoutSearch, Product
 from factory.apps.revise.pairing import Pairing
-from factory.floor.layout.stops import carried
 from factory.support.arrays import Array
 from factory.support.boxes import Point2
 
@@ -48,14 +47,14 @@ class Pins:
     @classmethod
     def of(cls, old: Layout, pairing: Pairing) -> Pins:
         """Those of a layout for the new factory of a pairing."""
-        on, kept = carriers(old.factory), pairing.robots
-        on_new = carriers(pairing.new)
+        was, kept = LayoutSearch(old.factory, old.product), pairing.robots
+        on, on_new = was.carriers, LayoutSearch(pairing.new, old.product).carriers
         beside = (r for r in kept if r and kept.get(on[r]) == on_new[kept[r]])
         paths = old.guidepaths
         stations = {
             pairing.operations[n]: round(paths[robot].length - old.station(n), 6)
             for robot in kept
-            for n in carried(old.factory, robot)
+            for n in was.carried(robot)
             if n in pairing.operations
         }
         return cls(

@@ -15,15 +15,15 @@ from typing import Any, Literal, get_args
 
 from factory.api import (
     NOPART,
-    Clearance,
     Factory,
     Ground,
     Hands,
     Layout,
+    LayoutMachines,
+    LayoutSearch,
     Pace,
     Project,
     RunError,
-    certified,
     pace,
 )
 from factory.apps.revise.inheriting import Inheritance
@@ -32,7 +32,6 @@ from factory.apps.revise.pairing import Pairing
 from factory.apps.revise.pinning import Pinning
 from factory.apps.revise.pins import Pins, StayingRobot, framed, same_module
 from factory.apps.revise.revision_picture import draw_revision
-from factory.floor.mating.mating import judged
 from factory.support.errors import usage_error
 
 Pin = Literal["all", "hands", "none"]
@@ -192,7 +191,7 @@ def revised(old: Project, new: Project, pin: Pin = "all") -> Revision:
     was = old.layout
     pairing = Pairing(matched, was.factory, new.plain)
     new = new.with_plan(replace(new.plan, names=_names(pairing)))
-    factory = judged(new.plain, new.product)
+    factory = LayoutSearch(new.plain, new.product).judged
     pairing = replace(pairing, new=factory)
     pins = Pins.of(was, pairing)
     ways: tuple[Pin, ...] = get_args(Pin)
@@ -212,12 +211,12 @@ def _laid_out(new: Project, was: Layout, factory: Factory, pins: Pins, pin: Pin)
     hands = Hands(factory, product, settings.acceleration, pins.hands)
     if pin == "hands":
         return new.ground.lay_out(factory, product, settings, hands)
-    size, speed = Clearance(settings.clearance, factory.carriage), Pace.of(settings)
-    pinning = Pinning(factory, product, size, speed, hands, pins)
+    search = LayoutSearch(factory, product, settings.clearance, Pace.of(settings), hands)
+    pinning = Pinning(search, pins)
     layout = pinning.layout()
     if layout is None:
         raise RunError(fault.diagnostic() for fault in pinning.faults)
-    return certified(layout, new.ground.floor, layout.certificate)
+    return LayoutMachines(layout).certified(new.ground.floor, layout.certificate)
 
 
 def _names(pairing: Pairing) -> tuple[str, ...]:

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.api import Diagnostic, InputError, WorldName
-from factory.support.bounds import check_values
+from factory.api import Diagnostic, InputError, Settings, WorldName
 from factory.support.errors import usage_error
 
 if TYPE_CHECKING:
@@ -100,7 +99,7 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         names = ("world", "units", "seed", "jitter", "wip", "max_time", "spares", "swap")
-        check_values({name: getattr(self, name) for name in names})
+        Settings.check_values({name: getattr(self, name) for name in names})
 
     @property
     def recovers(self) -> bool:

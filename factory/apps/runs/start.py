@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from factory.api import Diagnostic, GearNet, InputError, Marking, listing
-from factory.support.errors import Position, did_you_mean
-from factory.theory.nets.history import unreached
+from factory.api import Diagnostic, GearNet, InputError, Marking
+from factory.engine.record.history import unreached
+from factory.support.errors import Position, did_you_mean, listing
 
 
 def legal_marking(net: GearNet, names: str) -> Marking:

@@ -12,7 +12,6 @@ from itertools import product
 from math import ceil, isfinite, prod
 
 from factory.api import Diagnostic, InputError, Settings
-from factory.support.bounds import BOUNDS
 from factory.support.errors import did_you_mean
 
 Value = float | int | str | None
@@ -23,7 +22,10 @@ Point = tuple[tuple[str, Value], ...]
 SETTINGS = tuple(field.name for field in fields(Settings))
 
 WHOLE: Mapping[str, tuple[int, int]] = {
-    **{name: (int(BOUNDS[name][0]), int(BOUNDS[name][1])) for name in ("seed", "units", "wip")},
+    **{
+        name: (int(Settings.BOUNDS[name][0]), int(Settings.BOUNDS[name][1]))
+        for name in ("seed", "units", "wip")
+    },
     **{
         name: (int(low), int(high))
         for name, (low, high) in Settings.RANGES.items()
@@ -42,7 +44,7 @@ KEYS = ("seed", "jitter", "units", "wip", "world", FAULT_RATE, *SETTINGS)
 """All keys that may vary."""
 
 SHARES: Mapping[str, tuple[float, float]] = {
-    "jitter": (0, BOUNDS["jitter"][1]),
+    "jitter": (0, Settings.BOUNDS["jitter"][1]),
     FAULT_RATE: (0, 0.5),
 }
 """Keys of shares, with the least and the greatest value."""

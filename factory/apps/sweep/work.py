@@ -20,6 +20,7 @@ from factory.api import (
     RunRequest,
     Settings,
     Simulation,
+    Timing,
     proved,
 )
 from factory.apps.deviations import Campaign, Deviation
@@ -28,7 +29,6 @@ from factory.apps.runs.options import fusing_pays
 from factory.apps.runs.watched import watched
 from factory.apps.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.apps.sweep.recipe import Recipe
-from factory.engine.mjcf.timestep import timed
 from factory.engine.simulation.compiled import Compiled
 
 T = TypeVar("T")
@@ -123,7 +123,7 @@ class Runner:
         request = RunRequest(
             values["world"],
             values["units"],
-            settings=timed(settings, layout, values["world"], values["jitter"]),
+            settings=Timing(layout, settings, values["world"], jitter=values["jitter"]).stepped,
             wip=values["wip"],
             fuse=fuse,
             shown=False,

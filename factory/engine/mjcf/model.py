@@ -14,6 +14,7 @@ from functools import cached_property
 from math import ceil
 from pathlib import Path
 from types import MappingProxyType
+from typing import ClassVar
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -29,7 +30,8 @@ from factory.engine.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.engine.mjcf.insets import Insets, insets_of
 from factory.engine.mjcf.jaws import add_jaws
 from factory.engine.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
-from factory.engine.mjcf.parts import add_meshes, add_parts, add_wholes
+from factory.engine.mjcf.parts import HIDDEN, add_meshes, add_parts, add_wholes
+from factory.engine.mjcf.reservations import reservations_of
 from factory.engine.mjcf.robot_bodies import add_robots
 from factory.engine.mjcf.robots import MOTOR, Drive, add_paints
 from factory.engine.mjcf.scene import add_scene
@@ -82,6 +84,9 @@ class Model:
         overlaps: diagnostics of parts that overlap in the finished product.
     """
 
+    HIDDEN: ClassVar[float] = HIDDEN
+    SKELETON: ClassVar[Path] = SKELETON
+
     layout: Layout
     settings: Settings
     carried: FusedBodies = field(repr=False)
@@ -101,6 +106,21 @@ class Model:
     def __post_init__(self) -> None:
         for name in ("copies", "masses", "files"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @staticmethod
+    def product_name(factory: Factory) -> str:
+        """The name of a model: that of the PAG file, without folder and ending."""
+        return product_name(factory)
+
+    @staticmethod
+    def memory_of(root: Element) -> int:
+        """The engine's memory for a model, by its root element [MiB]."""
+        return memory_of(root)
+
+    @property
+    def reservations(self) -> tuple[str, ...]:
+        """What a run of it does not show, in words."""
+        return reservations_of(self.layout, self.excluded)
 
     @property
     def factory(self) -> Factory:

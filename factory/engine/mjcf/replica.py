@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
-from typing import Any
+from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.support.arrays import Array, Indices
+from factory.engine.mjcf.masks import NOBODY, loose_code, masks_of, robot_code
+from factory.engine.mjcf.pads import Pads, trunks
+from factory.support.arrays import Array, Index, Indices
 from factory.support.engine import mujoco
 
 SHOWN = 3
@@ -18,6 +21,8 @@ SHOWN = 3
 
 class Replica:
     """A model `m` and data `d` of its own, in which nothing sleeps, at the model's start."""
+
+    NOBODY: ClassVar[int] = NOBODY
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self.m = copy(m)
@@ -39,6 +44,29 @@ class Replica:
         self.m.eq_obj1id[active[:, 0]] = active[:, 1]
         self.m.eq_obj2id[active[:, 0]] = active[:, 2]
 
+    @staticmethod
+    def robot_code(robot: int) -> int:
+        """The code of a robot (index) as a holder of parts."""
+        return robot_code(robot)
+
+    @cached_property
+    def trunk(self) -> Index:
+        """For each body the one that it is a shell of; else itself (nbody,)."""
+        return trunks(self.m)
+
+    @cached_property
+    def pads(self) -> Pads:
+        """The pads of holders, and the geoms of parts that collide."""
+        return Pads(self.m)
+
+    def hold(self, body: int, code: int) -> None:
+        """Give a part the contact masks of what a holder (code) holds, or of NOBODY."""
+        self.mask(self.pads.solid[body], self.trunk == body, *masks_of(code))
+
+    def release(self, body: int) -> None:
+        """Give a part the contact masks of what nothing holds any more."""
+        self.hold(body, loose_code(body))
+
     def exclude_nothing(self) -> None:
         """Let no pair of bodies be left out of contact."""
         self.m.exclude_signature[:] = -1
@@ -57,6 +85,8 @@ class Geoms:
     Attributes:
         m: the model.
     """
+
+    SHOWN: ClassVar[int] = SHOWN
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self.m = m

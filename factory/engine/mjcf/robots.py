@@ -18,7 +18,7 @@ from factory.engine.mjcf.tools import TOOL, mount_tool
 from factory.floor.layout.dimensions import PAYLOAD
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.limbs import Limb
-from factory.support.xml_writer import add, number, numbers
+from factory.support.xml_writer import add, number, numbers, prefixed
 from factory.theory.plant.axes import Axis
 from factory.theory.problem.robot_bodies import LIFT_JOINT, MAST, RobotBody
 from factory.theory.problem.robot_types import RobotType
@@ -103,18 +103,6 @@ def load_robot_model(robot: RobotType) -> RobotModel:
         defaults.append(prefixed(child, robot.name))
     assets = tuple(prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
     return RobotModel(robot.name, robot.body, body, actuators, defaults, assets)
-
-
-def prefixed(element: Element, prefix: str, names: bool = False) -> Element:
-    """A copy in which references to classes and assets are prefixed, and names too if wanted."""
-    copy = deepcopy(element)
-    for node in copy.iter():
-        for key in ("class", "childclass", "material", "mesh", "texture"):
-            if key in node.attrib:
-                node.set(key, f"{prefix}/{node.get(key)}")
-        if names and "name" in node.attrib:
-            node.set("name", f"{prefix}/{node.get('name')}")
-    return copy
 
 
 ROLES = {

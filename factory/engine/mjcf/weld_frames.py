@@ -10,7 +10,7 @@ the end of a longer chain of joints follows from a product of exponentials of th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -33,13 +33,25 @@ ROWS = 6
 
 @dataclass(frozen=True, eq=False)
 class WeldFrames:
-    """Where n welds hold the origins of their parts: at `base` (n, 3) + sum over k of
-    `way` (n, k, 3) · qpos[`along` (n, k)] [m], turned by the quaternion `turn` (n, 4). A holder
-    that turns has turned its part by `spin` (n,) · qpos[`along` (n, 0)] besides, about a vertical
-    axis that is `arm` (n, 2) away from there when that is 0 [m]. A holder at the end of a `deep`
-    (n,) chain moves with the joints `along`, from the base on, by their `screws` (n, k, 8): anchor
-    [m], axis, whether it turns, and the coordinate at which `base` and `turn` hold; without such
-    holders these are (n, 0, 8)."""
+    """Where n welds hold the origins of their parts: at base + sum over k of way · qpos[along],
+    turned by a quaternion. A holder that turns has turned its part by spin · qpos[along, 0]
+    besides, about a vertical axis. A holder at the end of a chain moves with the joints `along`,
+    from the base on, by their screws.
+
+    Attributes:
+        base: where parts are with all coordinates at 0 (n, 3) [m].
+        along: addresses of the joints in qpos (n, k).
+        way: by how much a unit of each moves the part (n, k, 3).
+        turn: how parts are turned, quaternions (n, 4).
+        spin: by how much a unit of the first joint turns a part (n,).
+        arm: distance of the part from the axis of that, when it is 0 (n, 2) [m].
+        deep: whether the holder is at the end of a chain (n,).
+        screws: of the joints of chains (n, k, 8): anchor [m], axis, whether it turns, and the
+            coordinate at which `base` and `turn` hold; (n, 0, 8) without such holders.
+    """
+
+    SLIDE: ClassVar[int] = SLIDE
+    HINGE: ClassVar[int] = HINGE
 
     base: Array = field(repr=False)
     along: Index = field(repr=False)
@@ -98,6 +110,16 @@ class WeldFrames:
         base = np.where(deep[:, None], held, self.base)
         stand = np.where(deep[:, None], turn, self.turn)
         return WeldFrames(base, along, way, stand, spin, self.arm, deep, screws)
+
+    @staticmethod
+    def joints_of(m: mujoco.MjModel, body: int) -> list[int]:
+        """The joints that slide or turn a body, from the base on."""
+        return joints_of(m, body)
+
+    @staticmethod
+    def chain_of(m: mujoco.MjModel, body: int) -> list[int]:
+        """The joints of a holder at the end of a chain, from the base on; else none."""
+        return chain_of(m, body)
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from factory.engine.record.failures import Account
 from factory.engine.record.figures import PhysicsFigures
+from factory.engine.timing.demand import Demand, Word
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic
@@ -22,7 +23,6 @@ from factory.support.resource import Closing
 from factory.support.settings import Settings
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.undone import Undone
-from factory.theory.plant.demand import Demand, Word
 
 if TYPE_CHECKING:
     from factory.engine.mjcf.model import Model

@@ -8,7 +8,10 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+from factory.engine.record.history import firings
 from factory.engine.record.state import Recordable
+from factory.engine.timing.demand import Word
+from factory.engine.timing.pool import with_wip
 from factory.floor.geometry.fused_bodies import FusedBodies, bodies_of
 from factory.floor.layout.chains import Chains, SoughtCurves
 from factory.floor.layout.exclusions import goes_early
@@ -16,9 +19,8 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.way import BendRows, BentWay, Ways, kept_in, rows_of
 from factory.support.settings import Settings
 from factory.support.tables import table_of
-from factory.theory.nets.history import firings
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking
-from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 
@@ -120,6 +122,14 @@ class MonitorSubject:
             return self.chains.robots, self.chains.sought
         return (*self.ways,), Ways.bent(self.ways.values())
 
+    @property
+    def net(self) -> MarkedNet:
+        """The net with its initial tokens, which also bounds the units inside if they are
+        bounded."""
+        if self.wip is None:
+            return MarkedNet.of(self.factory.net)
+        return with_wip(self.factory, self.wip)
+
     @cached_property
     def counts(self) -> Mapping[int, int]:
         """Number of firings of each transition at the start of the run."""
@@ -196,7 +206,16 @@ class MonitorSubject:
 
 @dataclass(frozen=True, slots=True)
 class MonitorTable:
-    """The fields of a `MonitorSubject` in a log."""
+    """The fields of a `MonitorSubject` in a log.
+
+    Attributes:
+        goals: arc length of the goal of each robot, for each operation [m].
+        radii: radius of the goal ball of each operation [m].
+        places: by label, a centre of mass in the frame of the product [m].
+        patience: time without an event until a run counts as stalled [s].
+        early: (operation, robot) where a robot goes ahead regardless of the settings.
+        bends: bends of guidepaths, row by row.
+    """
 
     goals: tuple[tuple[float, ...], ...]
     radii: tuple[float, ...]

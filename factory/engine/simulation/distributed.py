@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.engine.record.state import Event
-from factory.engine.simulation.active import Active
 from factory.engine.simulation.bundles import Bundles
 from factory.engine.simulation.cells import Cells, Link
 from factory.engine.simulation.ordering import Ordering
@@ -81,9 +80,9 @@ class Record:
         self._under_way: list[int] = []
 
     @property
-    def active(self) -> Active:
-        """The operations under way."""
-        return Active(tuple(self._under_way))
+    def under_way(self) -> tuple[int, ...]:
+        """The operations (index) under way."""
+        return tuple(self._under_way)
 
     def start(self, operation: Operation, time: float) -> None:
         """The first robot enters an operation."""
@@ -160,9 +159,9 @@ class DistributedSupervisor:
         return self.record.events
 
     @property
-    def active(self) -> Active:
-        """The operations under way."""
-        return self.record.active
+    def under_way(self) -> tuple[int, ...]:
+        """The operations (index) under way."""
+        return self.record.under_way
 
     @property
     def marked(self) -> bytearray:

@@ -11,11 +11,11 @@ from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observation
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Hooks, Job
+from factory.engine.timing.demand import Word
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array, Index
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.demand import Word
 from factory.theory.plant.operation import Operation
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from factory.engine.timing.demand import Demand
 from factory.support.bounds import WorldName, check_values
 from factory.support.settings import Settings
 from factory.theory.nets.petri import Marking
-from factory.theory.plant.demand import Demand
 from factory.theory.problem.robot_types import Catalogue
 
 

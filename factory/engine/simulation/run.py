@@ -11,10 +11,12 @@ from factory.engine.record.ending import CutOff
 from factory.engine.record.failures import Failures
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.findings import Report
+from factory.engine.record.replay import replay
 from factory.engine.record.state import Event
 from factory.engine.record.verdict import RunVerdict
 from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
+from factory.theory.nets.petri import Marking
 from factory.theory.nets.undone import Entry, Undone, lasting
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import is_end, operation_of
@@ -31,11 +33,7 @@ STEADY = 4
 
 def steady_from(period: int = 1) -> int:
     """The number of products from which on a cycle time is measured, so that the last half of them
-    has a whole period.
-
-    Args:
-        period: number of units in a cycle of the net.
-    """
+    has a whole period (a number of units)."""
     return max(STEADY, 2 * period if period > 1 else 0)
 
 
@@ -137,6 +135,28 @@ class Run:
 
     def _repr_html_(self) -> str | None:
         return drawn(self)
+
+    @staticmethod
+    def is_refined(factory: Factory, entries: Sequence[str | Undone], start: Marking) -> bool:
+        """Whether a record of a factory, firings and what was undone from a marking on, is one of
+        its net."""
+        return replay(factory.net, entries, start, factory.joins).refines
+
+    @staticmethod
+    def steady_from(period: int = 1) -> int:
+        """The number of products from which on a cycle time is measured, where so many units are
+        made in a cycle of the net."""
+        return steady_from(period)
+
+    @staticmethod
+    def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
+        """Mean interval [s] between times of departure in the long run; None for too few."""
+        return mean_interval(left, period)
+
+    @staticmethod
+    def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
+        """Time that each robot spent in completed operations [s]."""
+        return busy_times(factory, events)
 
     @property
     def fired(self) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from factory.engine.record.state import Event
-from factory.engine.simulation.active import Active
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.timing.distributed import Scan
 from factory.theory.control.mode import Limits
@@ -23,7 +22,7 @@ class RunSupervisor(Protocol):
         factory: the factory as it is now.
         events: the record so far.
         marked: 1 for each place that the record marks, 0 for the others.
-        active: the operations under way.
+        under_way: the operations (index) under way.
         ordering: the order places that it keeps.
         scans: when each robot ticks, where each does so by itself.
     """
@@ -35,7 +34,7 @@ class RunSupervisor(Protocol):
     @property
     def marked(self) -> bytearray: ...
     @property
-    def active(self) -> Active: ...
+    def under_way(self) -> tuple[int, ...]: ...
     @property
     def ordering(self) -> Ordering: ...
     @property

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 from factory.engine.mjcf.timestep import timed
 from factory.engine.record.figures import PhysicsFigures
+from factory.engine.record.history import firings
+from factory.engine.record.replay import replay
 from factory.engine.record.state import Observer, State
 from factory.engine.simulation.compiled import Compiled
 from factory.engine.simulation.distributed import DistributedSupervisor
@@ -22,6 +24,7 @@ from factory.engine.simulation.run_supervisor import RunSupervisor
 from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
 from factory.engine.timing.cycle_time import CycleTime
+from factory.engine.timing.demand import Word
 from factory.engine.timing.on_demand import cycle_of
 from factory.engine.timing.timed import Timed, duration
 from factory.engine.timing.timing import Timing
@@ -33,10 +36,7 @@ from factory.floor.modes.staging import HeadStart, stages_of
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.theory.control.mode import Limits
-from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.replay import replay
-from factory.theory.plant.demand import Word
 
 if TYPE_CHECKING:
     from factory.engine.mjcf.loading import EngineModel
@@ -331,7 +331,7 @@ class Simulation:
         """Names the order that has not been placed, the robots that are in an operation, or else
         those that wait for one that cannot start."""
         factory, supervisor = self.supervisor.factory, self.supervisor
-        numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
+        numbers = supervisor.under_way or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
         pairs = ((factory.robots[r].name, o) for o in places for r in o.robots)
         robots = ", ".join(f"{name} in {o.template.name}({o.label})" for name, o in pairs)

@@ -18,15 +18,14 @@ from factory.engine.simulation.ahead import Ahead
 from factory.engine.simulation.bundles import Bundles
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.world import World
+from factory.engine.timing.demand import Word
 from factory.engine.timing.distributed import Scan
 from factory.floor.modes.staging import HeadStart
 from factory.support.arrays import Array, Truth
 from factory.theory.control.mode import STILL, Limits, Mode
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.threaded import Threads
 from factory.theory.nets.undone import Undone
-from factory.theory.plant.demand import Word
 from factory.theory.plant.factory import Factory
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import TransitionId
@@ -100,6 +99,11 @@ class Supervisor:
         """Which units are made."""
         return self.world.word
 
+    @property
+    def under_way(self) -> tuple[int, ...]:
+        """The operations (index) under way."""
+        return self.active.operations
+
     def limit(self, limits: Limits) -> None:
         """Set the limits of the axes."""
         self.bundles.limit(limits)
@@ -153,7 +157,7 @@ class Supervisor:
 
     def _mark(self, marking: Marking) -> None:
         net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
-        self.threads = Threads(net.threaded, net.threads_of(marking), starts)
+        self.threads = net.threads(marking, starts)
 
     def recall(self, axes: Container[int]) -> None:
         """End the stages of these axes wherever they are."""

@@ -10,11 +10,11 @@ from typing import Protocol
 from factory.engine.record.failures import Account
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Observation, Observer, State
+from factory.engine.timing.demand import Word
 from factory.support.arrays import Array, Index
 from factory.support.errors import Diagnostic
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.demand import Word
 from factory.theory.plant.operation import Operation
 
 Job = tuple[Operation, int]

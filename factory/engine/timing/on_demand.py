@@ -10,11 +10,11 @@ from functools import cached_property
 from math import inf
 
 from factory.engine.timing.cycle_time import CycleTime
+from factory.engine.timing.demand import Word
 from factory.engine.timing.distributed import Scan, ScannedTimes
 from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
 from factory.theory.nets.marked import token_free
-from factory.theory.plant.demand import Word
 
 
 def cycle_of(

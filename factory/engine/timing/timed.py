@@ -9,13 +9,13 @@ from functools import cached_property
 from typing import ClassVar
 
 from factory.engine.timing.cycle_time import CycleTime
+from factory.engine.timing.earliest import earliest_firings
 from factory.engine.timing.pool import with_wip
 from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
 from factory.support.settings import Settings
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
-from factory.theory.nets.earliest import earliest_firings
 from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import Way, busiest, ways_apart, with_ways
 from factory.theory.problem.ids import is_end

@@ -6,12 +6,12 @@ import colorsys
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from factory.floor.geometry.meshes import LEAST_MASS, MassProperties, Mesh, sound
-from factory.floor.geometry.pieces import box_piece, cylinder_piece, sphere_piece
+from factory.floor.geometry.pieces import MOST_PIECES, box_piece, cylinder_piece, sphere_piece
 from factory.support.arrays import Array
 from factory.support.errors import Diagnostic
 from factory.support.keeping import Keeping
@@ -60,6 +60,8 @@ class Solid:
         fed: angle about the vertical by which it is turned where it is presented [rad].
     """
 
+    MOST_PIECES: ClassVar[int] = MOST_PIECES
+
     label: str
     kind: str
     size: tuple[float, ...]
@@ -75,6 +77,11 @@ class Solid:
     corners: Array = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
     pieces: tuple[Array, ...] = field(default=(), repr=False)
     fed: float = 0.0
+
+    @staticmethod
+    def colour_of(node: Assembly, number: int) -> tuple[float, ...]:
+        """The colour of a part in the PAG, else one of a sequence in which neighbours differ."""
+        return colour(node, number)
 
     @property
     def axis(self) -> Array:

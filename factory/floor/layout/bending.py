@@ -18,12 +18,22 @@ from factory.support.boxes import Point2
 
 @dataclass(frozen=True, slots=True)
 class Detour:
-    """How the guidepath of a robot is bent: its new `travel`, its `bends`, and their `rounding`
-    [m]."""
+    """How the guidepath of a robot is bent.
+
+    Attributes:
+        travel: its new travel [m].
+        bends: where it bends; nothing where it is straight.
+        rounding: of its bends [m].
+    """
 
     travel: float
     bends: tuple[Bend, ...] = ()
     rounding: float = 0.0
+
+    @classmethod
+    def across(cls, travel: float, at: float, across: float, rounding: float) -> Detour:
+        """A detour with one bend: after a distance so far to the side [m]."""
+        return cls(travel, (Bend(at, across),), rounding)
 
     @property
     def first(self) -> tuple[Bend, float] | None:

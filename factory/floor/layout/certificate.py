@@ -4,8 +4,9 @@ apart that come near each other, and the faults."""
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
-from factory.floor.layout.dimensions import Clearance
+from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOADS, Clearance
 from factory.support.boxes import Box
 from factory.support.errors import Diagnostic, Position
 from factory.support.showing import Told
@@ -38,9 +39,25 @@ ALWAYS = -1
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A rectangle in one layer: its robot (a station counts to the robot it serves), body, label
-    carried, heights from z low to z high [m] with a lift up, and the operation in whose mode the
-    robot is, ALWAYS for an uncoupled region."""
+    """A rectangle in one layer that a body may take.
+
+    Attributes:
+        robot: its robot (index); a station counts to the robot it serves.
+        layer: the layer, from the floor up: CARRIAGES, ARMS, PAYLOADS.
+        kind: what takes it: ARM, PAYLOAD, POST, or another of `KINDS`.
+        box: the rectangle [m].
+        z: heights from low to high, with a lift up [m].
+        label: what the robot carries there.
+        mode: the operation (index) in whose mode the robot is there; ALWAYS where it may be there
+            in any.
+    """
+
+    CARRIAGES: ClassVar[int] = CARRIAGES
+    ARMS: ClassVar[int] = ARMS
+    PAYLOADS: ClassVar[int] = PAYLOADS
+    ARM: ClassVar[int] = ARM_BODY
+    PAYLOAD: ClassVar[int] = PAYLOAD_BODY
+    POST: ClassVar[int] = POST_BODY
 
     robot: int
     layer: int
@@ -54,6 +71,11 @@ class Region:
     def is_payload(self) -> bool:
         """Whether it is swept by what a robot carries."""
         return self.kind == PAYLOAD_BODY
+
+    @property
+    def stands(self) -> bool:
+        """Whether it is of a station."""
+        return self.kind in STATIONS
 
     @property
     def is_coupled(self) -> bool:

@@ -8,9 +8,10 @@ payloads.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from factory.support.decimals import up
-from factory.theory.problem.robot_bodies import CARRIAGE, MAST
+from factory.theory.problem.robot_bodies import ARM_WIDTH, CARRIAGE, MAST
 
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
 """The layers in which things can meet, from the floor up. What stands on the floor is in all of
@@ -53,6 +54,9 @@ RISE = 1 / 3
 """No line of sight that rises by less than this share of its way in plan gets to a part in its
 housing, which is above the housing's lower edge by so much of the housing's diagonal."""
 
+APART = 0.02
+"""Robots keep so far from what lies about [m]."""
+
 BEHIND = 0.015
 """How far behind the shed's shutter a product ends."""
 
@@ -68,6 +72,33 @@ SLOT = 0.001
 BELT_GAP = 3e-4
 """The outfeed lies this much below z0, so that the output robot brings its product without
 touching."""
+
+
+class Dimensions:
+    """The sizes and heights that the machines of all layouts share [m].
+
+    Attributes:
+        PAYLOAD: height of the lowest point of a product that is carried.
+        MAST: width that a mast has to itself.
+        ARM_WIDTH: width that an arm has to itself.
+        FINGER: width of a finger.
+        PAD: height of the suction pad from which a part hangs.
+        PLAY: between the walls of a housing and what is inside.
+        WALL: thickness of these walls.
+        RISE: least share of its way in plan by which a line of sight rises to a part in its
+            housing.
+        APART: distance that robots keep from what lies about.
+    """
+
+    PAYLOAD: ClassVar[float] = PAYLOAD
+    MAST: ClassVar[float] = MAST
+    ARM_WIDTH: ClassVar[float] = ARM_WIDTH
+    FINGER: ClassVar[float] = FINGER
+    PAD: ClassVar[float] = PAD
+    PLAY: ClassVar[float] = PLAY
+    WALL: ClassVar[float] = WALL
+    RISE: ClassVar[float] = RISE
+    APART: ClassVar[float] = APART
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from math import sqrt
 
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.layout import Layout
+from factory.floor.layout.way import rounding_for
 from factory.support.settings import Settings
 from factory.theory.control.profile import SpeedProfile
 from factory.theory.nets.ways import train_ratio
@@ -38,6 +39,11 @@ class Pace(SpeedProfile):
         """The pace of a run with these settings."""
         lost, ahead = settings.tick + settings.settle, settings.settle if settings.stage else None
         return cls(settings.speed, settings.acceleration, settings.eps, lost, ahead)
+
+    @property
+    def rounding(self) -> float:
+        """Rounding of corners that are passed at full speed [m]."""
+        return rounding_for(self.speed, self.acceleration)
 
     def on(self, path: Guidepath) -> Pace:
         """The pace on a guidepath, whose corners a robot passes at its speed."""

@@ -30,11 +30,11 @@ from factory.floor.layout.machines import presences
 from factory.floor.layout.nearness import Near, near
 from factory.floor.layout.presence import Presence
 from factory.floor.layout.staying import carried_ahead
+from factory.support.errors import listing
 from factory.theory.control.mode import ROUNDING
 from factory.theory.nets.coordinated import CoordinatedNet, Past
 from factory.theory.nets.exclusion import Circuit, Pair, excluding, ordered, overlap, times
 from factory.theory.nets.marked import MarkedNet
-from factory.theory.nets.verdict import listing
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import end_of, operation_of, start_of
 
@@ -118,7 +118,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     for rounds in range(ROUNDS, -1, -1):
         net = with_machines(layout, passes, [*at_home])
         if net.deadlock:
-            return Exclusions(faults=(_stuck(layout, net),))
+            return Exclusions(faults=(waiting_for_ever(layout, net),))
         sequence = one_unit(net.net, layout.factory)
         when = times(net.net, sequence)
         more = further(layout, net, backs) if further else Further()
@@ -145,7 +145,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     circuits |= _circuits(ordered_net, needed)
     orders = (*at_home, *orders)
     if (whole := with_machines(layout, passes, orders)).deadlock:
-        return Exclusions(faults=(_stuck(layout, whole),))
+        return Exclusions(faults=(waiting_for_ever(layout, whole),))
     return Exclusions(
         tuple(_excluded(ordered_net, pairs[n], circuit) for n, circuit in circuits.items()),
         orders,
@@ -155,7 +155,7 @@ def exclusions(layout: Layout, further: Presences | None = None) -> Exclusions:
     )
 
 
-def _stuck(layout: Layout, net: CoordinatedNet) -> Fault:
+def waiting_for_ever(layout: Layout, net: CoordinatedNet) -> Fault:
     """A circuit of the coordinated net without a token: its machines never move."""
     operations, circuit = layout.factory.operations, net.deadlock
     events = (operation_of(net.net.right[place]) for place in circuit)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from factory.support.apps import layout_variant
 from factory.support.bounds import check_values
+from factory.support.boxes import Box
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.theory.plant.factory import Factory
@@ -82,6 +83,13 @@ class Ground:
         """The variants of a layout that are asked for, which apps give."""
         asked = {"platen": self.tile is not None, "relay": self.relays and self.tile is None}
         return tuple(name for name, is_asked in asked.items() if is_asked)
+
+    @staticmethod
+    def tiles(layout: Layout) -> list[Box]:
+        """The tiles of a platen that a layout needs [m]; none on rails."""
+        from factory.floor.layout.tiles import tiles_of
+
+        return tiles_of(layout)
 
     def check(self, shared: bool) -> None:
         """Raises InputError (BadValue) where relays are asked for of robots with several tours

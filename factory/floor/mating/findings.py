@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 from factory.floor.mating.paths import TOLERANCE
 from factory.support.errors import Diagnostic, Position
@@ -103,11 +103,17 @@ def together(several: Iterable[Matings]) -> Matings:
 
 @dataclass(frozen=True)
 class Matings:
-    """The judgements of a product's operations, inputs before the operations that take them."""
+    """The judgements of a product's operations, how their inputs come together.
+
+    Attributes:
+        all: of each operation, inputs before the operations that take them.
+        parts: of each input of a blocked operation.
+    """
+
+    LEVEL: ClassVar[type[Level]] = Level
 
     all: tuple[Mating, ...]
     parts: Mapping[str, tuple[str, ...]] = field(repr=False)
-    """The parts of each input of a blocked operation."""
 
     @cached_property
     def approaches(self) -> Mapping[str, Approach]:

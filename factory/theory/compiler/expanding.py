@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from factory.support.errors import Position
 from factory.theory.plant.factory import Factory
@@ -34,6 +35,8 @@ class Node:
         last: where its last input is written.
     """
 
+    RELAY: ClassVar[str] = RELAY
+
     label: str
     template: Template
     inputs: tuple[str, ...]
@@ -41,6 +44,24 @@ class Node:
     size: int
     position: Position | None
     last: Position | None = None
+
+    @classmethod
+    def expand(
+        cls, pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN
+    ) -> dict[str, Node]:
+        """The operation instances of a product by label, each after its inputs, the product last;
+        joins have the forms of a plan, and what it hands over is relayed."""
+        return expand(pag, templates, plan)
+
+    @classmethod
+    def of_factory(cls, factory: Factory) -> dict[str, Node]:
+        """The operation instances of a factory, for the first unit of a period."""
+        return nodes_of(factory)
+
+    @staticmethod
+    def relay_label(label: str, number: int) -> str:
+        """Label after a hand-over, counted from 0."""
+        return relay_label(label, number)
 
     @property
     def held(self) -> int:
@@ -52,13 +73,7 @@ class Node:
 def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN) -> dict[str, Node]:
     """The operation instances by label, each after its inputs, the product last. Inputs beyond
     those of a template are inserted one by one: `x = mate(a, b, c)` becomes `x/2 = mate(a, b)`,
-    `x = insert(x/2, c)`.
-
-    Args:
-        pag: the product.
-        templates: the operations, by name.
-        plan: joins have its forms, and what it hands over is relayed.
-    """
+    `x = insert(x/2, c)`."""
     nodes: dict[str, Node] = {}
     for assembly in pag.postorder():
         for label, template, inputs, last in _operations(assembly, templates, plan.forms):

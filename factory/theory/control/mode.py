@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,6 +98,10 @@ class Mode:
 
     Raises ValueError where the values describe no mode, or its goal lies in Δ.
     """
+
+    REST: ClassVar[float] = REST
+    STILL: ClassVar[float] = STILL
+    ROUNDING: ClassVar[float] = ROUNDING
 
     goals: Array
     lower: Array

@@ -4,6 +4,6 @@
 * Proofs: `verify.py` (`verify`) of the compiled net, with `composition.py`; live where `token_free`
   of `marked.py` leaves no transition stuck. `coordinated.py` (`CoordinatedNet.deadlock`) is the
   same question of a net with a layout's waits, and `exclusion.py` proves which of its places are
-  never marked together. `replay.py` judges a record.
+  never marked together.
 * Times: `cycle_ratio.py`, `ways.py`.
 """

@@ -18,11 +18,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
+from factory.support.errors import listing
 from factory.theory.nets.gears import Gear
 from factory.theory.nets.marked import MANY, NONE, MarkedNet
-from factory.theory.nets.verdict import Defect, listing
+from factory.theory.nets.verdict import Defect
 
-MOST = 10
+MOST = Defect.MOST
 """Greatest number of defects of one kind that are listed."""
 
 
@@ -104,7 +105,7 @@ def _unclosed(net: MarkedNet, number: int) -> Defect:
         if a >= 0 and net.left[place] == a and net.right[place] == b:
             continue
         wanted = f"place {net.net.places[place].name} should be [{_event(net, a)};"
-        text = f"{called} is not closed: {wanted} {_event(net, b)}] and is {notation(net, place)}"
+        text = f"{called} is not closed: {wanted} {_event(net, b)}] and is {net.notation(place)}"
         kind = "missing consumer" if net.right[place] == NONE else "unclosed gear"
         if net.left[place] == NONE:
             kind, text = "missing producer", f"{text}: nothing marks it"
@@ -121,19 +122,12 @@ def _event(net: MarkedNet, event: int) -> str:
     return net.net.transitions[event].name if event >= 0 else "?"
 
 
-def notation(net: MarkedNet, place: int) -> str:
-    """A place as the paper writes it: [a, b; c]."""
-    at = net.net.places[place]
-    before = listing(net.net.transitions[e].name for e in at.left)
-    return f"[{before}; {listing(net.net.transitions[e].name for e in at.right)}]"
-
-
 def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Places and transitions that are part of no gear."""
     for place, owners in enumerate(net.owners):
         if not owners:
             at = net.net.places[place]
-            text = f"place {at.name} = {notation(net, place)} is in no gear"
+            text = f"place {at.name} = {net.notation(place)} is in no gear"
             beside = [q for e in at.left + at.right for q in net.net.preset[e] + net.net.postset[e]]
             near = sorted({gear for q in beside for gear in net.owners[q]})
             yield Defect.no_gear_net("place in no gear", text, near, [place])

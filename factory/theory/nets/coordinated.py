@@ -17,7 +17,7 @@ from functools import cached_property
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import NONE, MarkedNet, marked, stuck_circuit, token_free
 from factory.theory.nets.petri import PetriNet, Place, Transition
-from factory.theory.problem.ids import AxisId, PlaceId, TransitionId, is_end
+from factory.theory.problem.ids import AxisId, PlaceId, RobotId, TransitionId, carriage_axis, is_end
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,11 @@ class Past:
     axis: AxisId
     at: float
     direction: int = 1
+
+    @classmethod
+    def of_carriage(cls, after: TransitionId, robot: int, at: float, direction: int = 1) -> Past:
+        """That of a robot (index) along its guidepath."""
+        return cls(after, carriage_axis(RobotId(robot)), at, direction)
 
     def holds(self, x: float) -> bool:
         """Whether the axis at `x` [m] is past."""

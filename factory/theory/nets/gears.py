@@ -9,8 +9,8 @@ from heapq import heappop, heappush
 from itertools import count, pairwise
 
 from factory.support.showing import Pictured
-from factory.theory.nets.petri import Marking
-from factory.theory.nets.threaded import Slot, ThreadedNet
+from factory.theory.nets.petri import Marking, PetriNet
+from factory.theory.nets.threaded import Redistribution, Slot, ThreadedNet, Threads
 from factory.theory.problem.ids import PlaceId, TransitionId
 
 
@@ -65,6 +65,19 @@ class GearNet(Pictured):
     initial: tuple[PlaceId, ...]
     slots: tuple[tuple[int, ...], ...] = field(repr=False)
 
+    @classmethod
+    def of(
+        cls,
+        net: PetriNet,
+        moves: tuple[Redistribution, ...],
+        gears: tuple[Gear, ...],
+        initial: tuple[PlaceId, ...],
+        slots: tuple[tuple[int, ...], ...],
+    ) -> GearNet:
+        """The net with the redistribution function of each event (`moves`). Raises ValueError where
+        one is no bijection."""
+        return cls(ThreadedNet(net, moves), gears, initial, slots)
+
     def __repr__(self) -> str:
         net = self.threaded.net
         counts = f"{len(net.places)} places, {len(net.transitions)} transitions"
@@ -87,6 +100,11 @@ class GearNet(Pictured):
         return {
             (PlaceId(p), i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])
         }
+
+    def threads(self, marked: Marking, asked: Iterable[int]) -> Threads:
+        """A marking (m, f_m) that changes as transitions fire; it tells which of those `asked`
+        about are possible."""
+        return Threads(self.threaded, self.threads_of(marked), asked)
 
 
 def ascending(programs: Iterable[Sequence[int]], turns: Sequence[int]) -> tuple[int, ...]:

@@ -12,7 +12,9 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, MutableSequence, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import ClassVar
 
+from factory.support.errors import listing
 from factory.support.showing import Pictured
 from factory.theory.nets.gears import Gear, GearNet
 from factory.theory.nets.petri import PetriNet
@@ -38,6 +40,9 @@ class MarkedNet(Pictured):
     Raises ValueError where tokens and places differ in number, or a number is negative.
     """
 
+    NONE: ClassVar[TransitionId] = NONE
+    MANY: ClassVar[TransitionId] = MANY
+
     net: PetriNet
     tokens: tuple[int, ...]
     gears: tuple[Gear, ...] = ()
@@ -60,6 +65,27 @@ class MarkedNet(Pictured):
     def right(self) -> tuple[TransitionId, ...]:
         """For each place its consumer, NONE or MANY."""
         return tuple(_only(place.right) for place in self.net.places)
+
+    @classmethod
+    def of(cls, net: GearNet | MarkedNet) -> MarkedNet:
+        """A net with its initial tokens. A place that `initial` names for each robot in its slots
+        has one token; for each further time that it is named, one more."""
+        return marked(net)
+
+    @cached_property
+    def token_free(self) -> TokenFree:
+        """The topological order of a marked graph along its places without tokens."""
+        return token_free(self)
+
+    def stuck_circuit(self, stuck: Iterable[int]) -> tuple[int, ...]:
+        """The places of a circuit that never carries a token, where transitions are stuck."""
+        return stuck_circuit(self, stuck)
+
+    def notation(self, place: int) -> str:
+        """A place as the paper writes it: [a, b; c]."""
+        at, events = self.net.places[place], self.net.transitions
+        before, after = (listing(events[e].name for e in side) for side in (at.left, at.right))
+        return f"[{before}; {after}]"
 
     @property
     def is_marked_graph(self) -> bool:
@@ -127,12 +153,7 @@ class MarkedNet(Pictured):
 
 
 def marked(net: GearNet | MarkedNet) -> MarkedNet:
-    """A net with its initial tokens. A place that `initial` names for each robot in its slots has
-    one token; for each further time that it is named, one more.
-
-    Args:
-        net: a gear net, or a net that is marked already.
-    """
+    """A net with its initial tokens (`MarkedNet.of`)."""
     if isinstance(net, MarkedNet):
         return net
     tokens = [0] * len(net.threaded.places)
@@ -161,11 +182,7 @@ class TokenFree:
 
 
 def token_free(net: MarkedNet) -> TokenFree:
-    """The topological order of a marked graph along its places without tokens. Linear.
-
-    Args:
-        net: the marked graph.
-    """
+    """The topological order of a marked graph along its places without tokens. Linear."""
     waits = [0] * len(net.net.transitions)
     free = [not tokens for tokens in net.tokens]
     for event in net.blocked:

@@ -18,9 +18,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 
+from factory.support.errors import listing
 from factory.theory.nets.composition import MOST, Composition, named
-from factory.theory.nets.marked import MarkedNet, stuck_circuit
-from factory.theory.nets.verdict import Defect, listing
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.verdict import Defect
 
 
 def train_defects(net: MarkedNet, composition: Composition) -> tuple[Defect, ...]:
@@ -65,19 +66,11 @@ def dead_train_defects(net: MarkedNet, stuck: tuple[int, ...]) -> Iterator[Defec
     """The defects of a gear train whose gears carry one token each, given the transitions that
     never fire: it is not live, because of a circuit without token. With a transition that can fire
     before it stops, it is not reversible either."""
-    circuit, names = stuck_circuit(net, stuck), net.net.places
+    circuit, names = net.stuck_circuit(stuck), net.net.places
     events = tuple(net.right[place] for place in circuit)
     shown = listing(names[place].name for place in circuit)
     text = f"the circuit through {shown} carries no token"
     gears = tuple(dict.fromkeys(gear for place in circuit for gear in net.owners[place]))
     yield Defect("live", "token-free circuit", text, gears, circuit, events)
     for event in islice(net.enabled(net.tokens), 1):
-        yield no_way_back(net, event)
-
-
-def no_way_back(net: MarkedNet, event: int) -> Defect:
-    """The defect of a net that is not reversible: a transition that can fire is connected to one
-    that fires finitely often."""
-    name = net.net.transitions[event].name
-    text = f"{name} can fire, after which the initial marking is unreachable"
-    return Defect("reversible", "no way back", text, transitions=(event,))
+        yield Defect.no_way_back(net, event)

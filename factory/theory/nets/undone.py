@@ -49,6 +49,11 @@ class Undone:
         undone = (name for name, was, now in triples for _ in range(was - now))
         return cls(*what, tuple(names[event] for event in asked), tuple(undone))
 
+    @staticmethod
+    def lasting(entries: Iterable[str | Undone]) -> list[int]:
+        """Indices of the firings that are not undone."""
+        return lasting(entries)
+
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
         return {

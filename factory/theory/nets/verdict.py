@@ -5,6 +5,7 @@ from __future__ import annotations
 import builtins
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from factory.support.errors import Position
 from factory.support.showing import Told
@@ -18,11 +19,18 @@ PROPERTIES = ("gear_net", *BEHAVIOUR)
 
 @dataclass(frozen=True, slots=True)
 class Defect:
-    """Why a property fails, or is undecided, by indices of gears, places and transitions.
+    """Why a property fails, or is undecided.
 
-    `kind` is one of a few fixed phrases (`lost token`, `unclosed gear`, ...); `reason` says it in
-    full. `transitions` is a firing sequence where the kind speaks of one.
+    Attributes:
+        property: the property.
+        kind: one of a few fixed phrases (`lost token`, `unclosed gear`, ...).
+        reason: the same in full.
+        gears: those concerned (index).
+        places: those concerned (index).
+        transitions: those concerned (index); a firing sequence where the kind speaks of one.
     """
+
+    MOST: ClassVar[int] = 10
 
     property: str
     kind: str
@@ -44,6 +52,14 @@ class Defect:
         return cls(
             "gear_net", kind, reason, tuple(dict.fromkeys(gears)), tuple(places), tuple(transitions)
         )
+
+    @classmethod
+    def no_way_back(cls, net: MarkedNet, event: int) -> Defect:
+        """The defect of a net that is not reversible: a transition that can fire is connected to
+        one that fires finitely often."""
+        name = net.net.transitions[event].name
+        text = f"{name} can fire, after which the initial marking is unreachable"
+        return cls("reversible", "no way back", text, transitions=(event,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,15 +209,3 @@ def _owners(net: MarkedNet, places: tuple[int, ...]) -> tuple[int, ...]:
 def _labels(net: MarkedNet, places: Iterable[int]) -> tuple[str, ...]:
     named = (net.net.places[p].label for p in places)
     return tuple(dict.fromkeys(label for label in named if label not in ("", NOPART)))
-
-
-def listing(names: Iterable[str], most: int = 6) -> str:
-    """Names in a sentence: the first few, then how many more.
-
-    Args:
-        names: the names.
-        most: number of names that are written.
-    """
-    every = list(names)
-    shown = ", ".join(every[:most])
-    return shown + (f" and {len(every) - most} more" if len(every) > most else "")

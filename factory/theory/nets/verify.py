@@ -13,15 +13,16 @@ way.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from itertools import islice
 
 from factory.support.collector import collector_paused
-from factory.support.errors import Diagnostic, Position, RunError
+from factory.support.errors import Diagnostic, Position, RunError, listing
 from factory.theory.nets.composition import MOST, Composition, named
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked, token_free
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.train import dead_train_defects, train_defects
-from factory.theory.nets.verdict import Defect, Verdict, listing
+from factory.theory.nets.verdict import Defect, Verdict
 
 
 def proved(net: GearNet) -> Verdict:
@@ -52,32 +53,50 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
 
     Live, safe and reversible are undecided (None) where the claim or the marking fails.
     """
-    subject = marked(net)
-    against, train = shape_defects(net, subject, Composition.of(subject))
-    illegal = legality_defects(net, subject)
-    defects: Iterable[Defect] = ()
-    if illegal or not train:
-        text = "undecided: it is proved of gear nets with a legal marking only"
-        defects = (Defect(name, "undecided", text) for name in ("live", "safe", "reversible"))
-    elif stuck := token_free(subject).stuck:
-        defects = dead_train_defects(subject, stuck)
-    return Verdict.of(subject, (*against, *defects, *illegal), train, sources)
+    return GearProof.of(net).verdict(sources)
 
 
-def shape_defects(
-    net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
-) -> tuple[tuple[Defect, ...], bool]:
-    """The defects of a gear net or gear train, in its composition and in slots that change their
-    robot, and whether the net is a gear train. `subject`: the net with its tokens."""
-    moved = tuple(islice(_changed_slots(net), MOST)) if isinstance(net, GearNet) else ()
-    untrained = train_defects(subject, composition)
-    more = (defect for defect in untrained if defect.property == "gear_train")
-    return (*composition.defects, *moved, *more), not untrained and not moved
+@dataclass(frozen=True)
+class GearProof:
+    """What is known of a net by its gears, before its behaviour is.
 
+    Attributes:
+        subject: the net with its tokens.
+        composition: its gears in the order in which they compose it, or the defects.
+        against: the defects of a gear net or gear train, in its composition and in slots that
+            change their robot.
+        train: whether it is a gear train.
+        illegal: the defects of the initial marking.
+    """
 
-def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:
-    """The defects of the initial marking; `subject`: the net with its tokens."""
-    return tuple(islice(_illegal(net, subject), MOST))
+    subject: MarkedNet
+    composition: Composition
+    against: tuple[Defect, ...]
+    train: bool
+    illegal: tuple[Defect, ...]
+
+    @classmethod
+    def of(cls, net: GearNet | MarkedNet) -> GearProof:
+        """The proof of a net with gears. Linear."""
+        subject = MarkedNet.of(net)
+        composition = Composition.of(subject)
+        moved = tuple(islice(_changed_slots(net), MOST)) if isinstance(net, GearNet) else ()
+        untrained = train_defects(subject, composition)
+        more = (defect for defect in untrained if defect.property == "gear_train")
+        against = (*composition.defects, *moved, *more)
+        illegal = tuple(islice(_illegal(net, subject), MOST))
+        return cls(subject, composition, against, not untrained and not moved, illegal)
+
+    def verdict(self, sources: Mapping[str, Position] | None) -> Verdict:
+        """The verdict on the net (see `verify`)."""
+        defects: Iterable[Defect] = ()
+        if self.illegal or not self.train:
+            text = "undecided: it is proved of gear nets with a legal marking only"
+            defects = (Defect(name, "undecided", text) for name in ("live", "safe", "reversible"))
+        elif stuck := self.subject.token_free.stuck:
+            defects = dead_train_defects(self.subject, stuck)
+        every = (*self.against, *defects, *self.illegal)
+        return Verdict.of(self.subject, every, self.train, sources)
 
 
 def _changed_slots(net: GearNet) -> Iterator[Defect]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 from factory.support.errors import Diagnostic, Position
 from factory.theory.problem.pag import ROUNDING, AllowedOverlap, most_allowed
@@ -68,6 +68,8 @@ class Approach:
             the pairs that get no deeper into each other than they are in the finished product,
             but cut more out of each other.
     """
+
+    MARGIN: ClassVar[float] = MARGIN
 
     kind: Kind
     axis: int

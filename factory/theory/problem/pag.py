@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import ClassVar
 
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.settings import MOST_UNITS
@@ -74,8 +75,13 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class AllowedOverlap:
     """An overlap that is meant, in the finished product, such as a press fit, or on the way of a
-    part to its place, such as a snap fit: up to a `depth` [m], of two `parts` or, where none are
-    named, of any two. Its position does not count in comparisons; an option has none."""
+    part to its place, such as a snap fit.
+
+    Attributes:
+        depth: the most that is meant [m].
+        parts: the two parts; nothing for any two.
+        position: where it is written; an option has none. It does not count in comparisons.
+    """
 
     depth: float
     parts: tuple[str, ...] = ()
@@ -117,6 +123,9 @@ class PAG(Pictured):
     `factory.theory.lang.read_pag` checks that it is a tree.
     """
 
+    RESERVED: ClassVar[frozenset[str]] = RESERVED
+    SHAPES: ClassVar[tuple[str, ...]] = SHAPES
+
     root: str
     nodes: tuple[Assembly, ...]
     count: int | None = None
@@ -128,6 +137,10 @@ class PAG(Pictured):
     def __repr__(self) -> str:
         parts = sum(1 for _ in self.parts())
         return f"<PAG {self.title}: {parts} parts, {len(self) - parts} operations, {self.file}>"
+
+    def mixed(self, counts: tuple[tuple[str, int], ...]) -> PAG:
+        """The graph of several products, so many of each in a period."""
+        return replace(self, mix=Mix(counts))
 
     @cached_property
     def by_label(self) -> Mapping[str, Assembly]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-from factory.theory.problem.robot_bodies import RobotBody
+from factory.theory.problem.robot_bodies import CARRIAGE, WAY, RobotAxis, RobotBody
 
 LIFT = "lift"
 """The type of a robot that can lower what it brings, or set its hand to different heights."""
@@ -53,6 +53,20 @@ class Catalogue:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "types", MappingProxyType(dict(self.types)))
+
+    def with_chain(
+        self,
+        name: str,
+        mjcf: Path,
+        extends: str,
+        masses: tuple[float, float],
+        joints: Sequence[str],
+    ) -> Catalogue:
+        """The catalogue with a type whose one axis moves several joints along a curve, each with
+        an actuator of its name; `masses`: of all of it, and of what moves [kg]."""
+        axis = RobotAxis(WAY, masses[1], moves=tuple((joint, joint) for joint in joints))
+        made = RobotType(name, mjcf, RobotBody(CARRIAGE, masses[0], (axis,)), extends)
+        return Catalogue({**self.types, name: made})
 
     def __getitem__(self, name: str) -> RobotType:
         return self.types[name]

@@ -24,11 +24,11 @@ from factory.apps.live.interventions import Interventions
 from factory.apps.live.outages import Outages
 from factory.apps.live.page import page, stage_of
 from factory.engine.mjcf import names
+from factory.engine.record.replay import replay
 from factory.engine.record.state import State
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from factory.theory.nets.replay import replay
 from tests.command_line import Terminal, started
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running

@@ -14,8 +14,8 @@ import pytest
 from factory.apps.analyze.measured import logged_record
 from factory.apps.log.reader import Log, read_log
 from factory.apps.monitor.record import recorded_subject, verdict_on
+from factory.engine.record.replay import replay
 from factory.support.errors import InputError
-from factory.theory.nets.replay import replay
 from factory.theory.nets.undone import Undone
 from factory.theory.plant.factory import Factory
 from tests.apps.log.test_log import put_together, taken_apart

@@ -331,7 +331,7 @@ def test_a_carrier_stays_for_what_can_no_longer_stop_before_it() -> None:
     came onto a shaft. One that waits at its standoff is let in only while the carrier rests."""
     layout, request = with_hands("lamp"), RunRequest(units=1)
     simulation = Simulation(layout, request)
-    corridors = Corridors(layout, simulation.timing.coordinated, simulation.modes)
+    corridors = Corridors(simulation.timing)
     factory, fired = layout.factory, [0] * len(layout.factory.net.threaded.transitions)
     tried = 0
     for operation, mode in zip(factory.operations, simulation.modes, strict=True):

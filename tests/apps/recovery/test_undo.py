@@ -12,8 +12,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from factory.apps.recovery.undo import marking_after, tokens_after, undo
+from factory.engine.record.replay import ReplayVerdict, replay
 from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.nets.replay import ReplayVerdict, replay
 from factory.theory.nets.undone import Entry, Joins, Undone, lasting
 from factory.theory.plant.factory import Factory
 from tests.fold_values import random_fold, three_robots

@@ -26,9 +26,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from factory.api import NONE, GearNet, MarkedNet, Verdict, marked, token_free
+from factory.api import GearNet, GearProof, MarkedNet, Verdict
 from factory.apps.exports.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
-from factory.theory.nets.composition import Composition
 
 Json = dict[str, Any]
 
@@ -38,19 +37,19 @@ def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
 
     Raises ValueError where two places or transitions of the net have one name.
     """
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     if verdict.gears and not subject.slots:
         subject = subject.with_gears(verdict.gears)
     if len(subject.net.place_index) < len(subject.tokens):
         raise ValueError("two places have one name")
     if len(subject.net.transition_index) < len(subject.net.transitions):
         raise ValueError("two transitions have one name")
-    composition = Composition.of(subject)
+    proof = GearProof.of(subject)
     document: Json = {
         "schema": SCHEMA,
         "net": _listing(net, subject),
         "robots": _robots(net, subject),
-        **{claim: _section(claim, subject, composition, verdict) for claim in CLAIMS},
+        **{claim: _section(claim, subject, proof, verdict) for claim in CLAIMS},
         **({TRAIN: _gear_train(subject, verdict)} if TRAIN in verdict.properties else {}),
     }
     return {**document, "digest": digest(document)}
@@ -104,12 +103,12 @@ def _marked_places(net: MarkedNet) -> list[int | None]:
     return [next((p for p in gear.places if net.tokens[p]), None) for gear in net.gears]
 
 
-def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verdict) -> Json:
+def _section(claim: str, net: MarkedNet, proof: GearProof, verdict: Verdict) -> Json:
     holds = getattr(verdict, claim)
     if holds:
         by_gears = claim in ("gear_net", "legal") or verdict.method == "structure"
         follows = claim != "reversible" or (verdict.live and verdict.safe)
-        evidence = _EVIDENCE[claim](net, composition) if by_gears and follows else None
+        evidence = _EVIDENCE[claim](net, proof) if by_gears and follows else None
         if evidence is None:
             return {"holds": None, "reason": "it holds, but not by gears alone: not certified"}
         return {"holds": True, **evidence}
@@ -118,10 +117,10 @@ def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verd
     return {"holds": holds, "kind": witness.kind, "reason": witness.reason, **names}
 
 
-def _gear_net(net: MarkedNet, composition: Composition) -> Json:
+def _gear_net(net: MarkedNet, proof: GearProof) -> Json:
     order = []
     present: list[list[int]] = [[] for _ in net.tokens]
-    for joint in composition.joints:
+    for joint in proof.composition.joints:
         meets = [] if joint.place is None else list(present[joint.place])
         exempt = "tool of one operation" if meets and joint.c is None else None
         ends = {"place": joint.place, "a": joint.a, "b": joint.b, "c": joint.c}
@@ -135,33 +134,34 @@ def _gear_train(net: MarkedNet, verdict: Verdict) -> Json:
     """Of a live train the order; of any other that it is one."""
     events = net.net.transitions
     proved = verdict.live and verdict.legal
-    order = [events[e].name for e in token_free(net).order] if proved else None
+    order = [events[e].name for e in net.token_free.order] if proved else None
     return {"holds": True, "order": order}
 
 
-def _safe(net: MarkedNet, composition: Composition) -> Json | None:
-    covered = net.cover(composition.closed)
-    return None if NONE in covered else {"cover": covered}
+def _safe(net: MarkedNet, proof: GearProof) -> Json | None:
+    covered = net.cover(proof.composition.closed)
+    return None if MarkedNet.NONE in covered else {"cover": covered}
 
 
-def _live(net: MarkedNet, composition: Composition) -> Json:
+def _live(net: MarkedNet, proof: GearProof) -> Json:
     """The order of the transitions gives one of the places they mark."""
-    events = token_free(net).order
+    events = net.token_free.order
     postset, tokens = net.net.postset, net.tokens
     order: list[int] = [p for event in events for p in postset[event] if not tokens[p]]
-    order += [p for p, producer in enumerate(net.left) if producer == NONE and not tokens[p]]
+    begun = (p for p, producer in enumerate(net.left) if producer == MarkedNet.NONE)
+    order += [p for p in begun if not tokens[p]]
     return {"order": order}
 
 
-def _reversible(net: MarkedNet, composition: Composition) -> Json | None:
-    return None if _safe(net, composition) is None else {}
+def _reversible(net: MarkedNet, proof: GearProof) -> Json | None:
+    return None if _safe(net, proof) is None else {}
 
 
-def _legal(net: MarkedNet, composition: Composition) -> Json:
+def _legal(net: MarkedNet, proof: GearProof) -> Json:
     return {"marked": _marked_places(net)}
 
 
-_EVIDENCE: dict[str, Callable[[MarkedNet, Composition], Json | None]] = {
+_EVIDENCE: dict[str, Callable[[MarkedNet, GearProof], Json | None]] = {
     "gear_net": _gear_net,
     "safe": _safe,
     "live": _live,

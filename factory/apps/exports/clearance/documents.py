@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from factory.api import Diagnostic, InputError, MarkedNet, marked, read_text
+from factory.api import Diagnostic, InputError, MarkedNet, read_text
 from factory.apps.foreign_nets.pnml_reader import read_pnml
 from factory.apps.log.content import LARGE
 from factory.support.engine import mujoco, unwarned
@@ -150,7 +150,7 @@ def _model(path: Path) -> mujoco.MjModel:
 
 def net_of(text: str, path: Path = Path()) -> dict[str, Row]:
     """The places of a net in PNML, by name. Raises InputError."""
-    net: MarkedNet = marked(read_pnml(text, str(path)))
+    net: MarkedNet = MarkedNet.of(read_pnml(text, str(path)))
     rows, events = dict[str, Row](), net.net.transitions
     for place, tokens in zip(net.net.places, net.tokens, strict=True):
         if len(place.left) != 1 or len(place.right) != 1:

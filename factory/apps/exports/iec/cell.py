@@ -9,12 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from factory.api import Diagnostic, Factory, InputError, Layout, Settings, coordinated
+from factory.api import Diagnostic, Factory, InputError, Layout, Settings, Timing
 from factory.apps.exports.iec import declarations as iec
 from factory.apps.exports.iec.robots import COMPLETED, RobotBlocks
 from factory.apps.exports.subject import Subject
-from factory.floor.modes.modes import operation_modes
-from factory.floor.modes.staging import stages_of
 
 SCAN = 10
 """Default period of the task [ms]."""
@@ -56,14 +54,7 @@ def cell(layout: Layout, settings: Settings, name: str, scan: int = SCAN) -> iec
     """All that is declared for a layout, of a product with a name; its task has a period `scan`
     [ms]. Raises InputError where a mode cannot be entered."""
     factory = layout.factory
-    modes = operation_modes(layout, settings.eps)
-    blocks = RobotBlocks(
-        layout,
-        modes,
-        stages_of(layout, modes, settings),
-        coordinated(layout).orders,
-        stations(factory),
-    )
+    blocks = RobotBlocks(Timing(layout, settings), stations(factory))
     units = [blocks.block(robot.index) for robot in factory.robots]
     return iec.Declarations(
         f"{name}: the programs of {len(units)} robots",

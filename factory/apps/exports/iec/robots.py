@@ -13,11 +13,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from math import ceil
 
-from factory.api import NOPART, Layout, Mode
+from factory.api import NOPART, Layout, Mode, Order, Timing
 from factory.apps.exports.iec.declarations import OrganizationUnit, Variable, comment
-from factory.floor.modes.staging import HeadStart
-from factory.theory.control.mode import STILL
-from factory.theory.nets.coordinated import Order
 from factory.theory.plant.programs import Program, ProgramStep
 
 WAIT, RUN, GRIP, LEAVE = range(4)
@@ -46,15 +43,16 @@ LOCALS = (
 
 @dataclass(frozen=True)
 class RobotBlocks:
-    """Writes the function blocks of a layout's robots. `modes`: of its operations; `stages`: ways
-    ahead of them; `orders`: order places of the coordinated net; `stations`: the number of the
-    station where an operation (index) takes a part, or drops a product off."""
+    """Writes the function blocks of a layout's robots. `timing`: of the layout; `stations`: the
+    number of the station where an operation (index) takes a part, or drops a product off."""
 
-    layout: Layout
-    modes: tuple[Mode, ...]
-    stages: tuple[HeadStart, ...]
-    orders: tuple[Order, ...]
+    timing: Timing
     stations: Mapping[int, int]
+
+    @property
+    def layout(self) -> Layout:
+        """The layout."""
+        return self.timing.layout
 
     def block(self, robot: int) -> OrganizationUnit:
         """The function block of a robot (index)."""
@@ -137,7 +135,7 @@ class RobotBlocks:
             yield f"{cell}.Carries = {self._made(label)}"
         if operation.index in self.stations:
             yield f"Ready[{self.stations[operation.index]}]"
-        for order in self.orders:
+        for order in self.timing.coordinated.orders:
             if order.start == operation.start:
                 yield self._ordered(order)
         if operation.inputs and not step.until and operation.index not in self.stations:
@@ -175,7 +173,7 @@ class RobotBlocks:
         """The set-points of a robot that goes ahead while it waits; it never turns back. An axis
         that follows another goes when that is there."""
         before = ""
-        for stage in self.stages:
+        for stage in self.timing.stages:
             if (stage.robot, stage.operation) != (robot, step.operation.index):
                 continue
             at, goal, rises = f"Axes[{stage.axis + 1}]", stage.goal, stage.goal >= stage.start
@@ -188,7 +186,7 @@ class RobotBlocks:
     def _motion(self, step: ProgramStep, robot: int) -> Iterator[str]:
         """The set-points of the robot's own axes; behind a gate short of the goal."""
         factory, number = self.layout.factory, step.operation.index
-        mode, axes = self.modes[number], factory.moves[number]
+        mode, axes = self.timing.modes[number], factory.moves[number]
         for slot, axis in enumerate(axes):
             if factory.robot_of(axis) != robot:
                 continue
@@ -223,11 +221,11 @@ class RobotBlocks:
 
     def _reached(self, step: ProgramStep) -> Iterator[str]:
         number = step.operation.index
-        mode = self.modes[number]
+        mode = self.timing.modes[number]
         yield "        Reached := TRUE;"
         for slot, axis in enumerate(self.layout.factory.moves[number]):
             there = _at(axis, float(mode.goals[slot]), mode.eps)
-            still = f"ABS(Axes[{axis + 1}].Speed) < {_real(STILL)}"
+            still = f"ABS(Axes[{axis + 1}].Speed) < {_real(Mode.STILL)}"
             yield f"        Reached := Reached AND {there} AND {still};"
 
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from factory.api import MujocoWorld
 from factory.apps.recovery.sweeping import SweptFloor
-from factory.engine.mjcf.masks import robot_code
 from factory.floor.layout.bins import Bin
 
 SETTLES = 0.5
@@ -83,7 +82,7 @@ class Fallen:
         """Drop everything that a robot holds, to lie for some time [s], into a bin if one is
         given."""
         world = self._world
-        bodies = world.parts.holdings.drop(robot_code(robot))
+        bodies = world.parts.holdings.drop(world.parts.holdings.code(robot))
         self.heaps.append(Heap(bodies, world.time + seconds, into))
         if into is not None:
             self._jets.blow(bodies.values(), into)

@@ -10,8 +10,6 @@ import numpy as np
 from factory.api import MujocoWorld, Operation
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
-from factory.engine.mjcf.masks import robot_code
-from factory.engine.simulation.mujoco.pressing import PRESSED
 from factory.support.engine import mujoco
 
 FAR = 1.0
@@ -65,7 +63,7 @@ class Mishaps:
         """Open a robot's hand."""
         parts = self._world.parts
         held = parts.holdings.hand(robot)
-        parts.welds.open([parts.holdings.weld[robot_code(robot), label] for label in held])
+        parts.welds.open([parts.holdings.weld[parts.holdings.code(robot), label] for label in held])
         parts.welds.write()
         self._fallen.watch(held.values())
         self.opened.add(robot)
@@ -73,7 +71,7 @@ class Mishaps:
     def slip(self, operation: Operation, metres: float) -> None:
         """Let the last input of an operation slip upwards in its hand."""
         holdings, robot = self._world.parts.holdings, operation.robots[operation.last]
-        welds = tuple(holdings.weld[robot_code(robot), label] for label in holdings.hand(robot))
+        welds = tuple(holdings.weld[holdings.code(robot), label] for label in holdings.hand(robot))
         for weld in welds:
             place = self._world.m.eq_data[weld, 3:10]
             self._world.parts.welds.offset(weld, place + metres * UP)
@@ -133,10 +131,11 @@ class Mishaps:
 
     def _touches(self, body: int, pad: int) -> None:
         """Count a contact of a body with the pad that holds it: the engine excludes that pair."""
-        world, touched = self._world, self._world.inspection.pressing.touched
+        world, pressing = self._world, self._world.inspection.pressing
         for geom in world.parts.masks.solid[body].tolist():
-            if mujoco.mj_geomDistance(world.m, world.d, pad, geom, 0.0, None) < -PRESSED:
-                touched.add((pad, geom))
+            apart = mujoco.mj_geomDistance(world.m, world.d, pad, geom, 0.0, None)
+            if apart < -pressing.PRESSED:
+                pressing.touched.add((pad, geom))
 
     def take_back(self, body: int) -> None:
         """Withdraw a part, whether a camera has examined it or not."""

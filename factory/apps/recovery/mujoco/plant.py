@@ -7,15 +7,12 @@ from math import radians
 
 import numpy as np
 
-from factory.api import NOPART, Factory, MujocoWorld, Operation, RunVerdict
+from factory.api import NOPART, Factory, MujocoWorld, Operation, RunVerdict, WeldFrames
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.deviations.deviation import Deviation
 from factory.apps.recovery.mujoco.fallen import Fallen
 from factory.apps.recovery.mujoco.mishaps import Mishaps
 from factory.apps.recovery.plant import Plant
-from factory.engine.mjcf.masks import robot_code
-from factory.engine.mjcf.weld_frames import WeldFrames
-from factory.engine.simulation.mujoco.holdings import Holdings
 from factory.floor.layout.bins import Bin
 from factory.support.arrays import Array, Index
 
@@ -54,7 +51,7 @@ class Senses:
         if self._seen != holdings.changes:
             self._seen = holdings.changes
             held = [
-                (holdings.weld[robot_code(robot), label], body, robot)
+                (holdings.weld[holdings.code(robot), label], body, robot)
                 for robot, bodies in holdings.in_hands().items()
                 for label, body in bodies.items()
             ]
@@ -73,7 +70,7 @@ class Senses:
         """Measured distance of inputs from their places in a joint about to be made [m]."""
         holdings = self._world.parts.holdings
         held = [
-            (holdings.weld[robot_code(operation.carrier), label], body)
+            (holdings.weld[holdings.code(operation.carrier), label], body)
             for robot in operation.robots
             if robot != operation.carrier
             for label, body in holdings.hand(robot).items()
@@ -111,7 +108,7 @@ class MujocoPlant(Plant):
 
     def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
         self._world, self._layout, self._clear = world, world.model.layout, campaign.clear
-        self._fallen = Fallen(world)
+        self._fallen, self._holdings = Fallen(world), world.parts.holdings
         self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
         self._scrapped, self._spilled = SCRAP, list[str]()
 
@@ -119,12 +116,8 @@ class MujocoPlant(Plant):
     def _factory(self) -> Factory:
         return self._layout.factory
 
-    @property
-    def _holdings(self) -> Holdings:
-        return self._world.parts.holdings
-
     def lose(self, robot: int) -> bool:
-        unit = self._holdings.unit(robot_code(robot))
+        unit = self._holdings.unit(self._holdings.code(robot))
         if unit is None or unit >= SCRAP:
             return False
         self._mishaps.open(robot)
@@ -156,7 +149,8 @@ class MujocoPlant(Plant):
             self.supplied()
 
     def lost(self) -> Sequence[int]:
-        units = ((robot, self._holdings.unit(robot_code(robot))) for robot in self._senses.lost())
+        holdings, lost = self._holdings, self._senses.lost()
+        units = ((robot, holdings.unit(holdings.code(robot))) for robot in lost)
         return [robot for robot, unit in units if unit is not None and unit < SCRAP]
 
     def knocked(self, robot: int) -> bool:

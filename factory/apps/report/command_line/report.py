@@ -50,7 +50,7 @@ def report(
     Runs FILE.pag, or takes the run in a LOG of `run --log`. The page is always written. The exit
     status is 1 if the run failed, or was cut off before its units were made; --lenient ignores what
     its bodies do, and with --strict a run whose success is qualified fails."""
-    from factory.api import steady_from
+    from factory.api import Run
     from factory.apps.log import is_log
     from factory.apps.report.page import report_on
     from factory.support.files import write_text
@@ -64,7 +64,7 @@ def report(
     else:
         asked.check_combination()
         project = options.project(out.silent)
-        asked = replace(asked, units=units or steady_from(project.plain.period))
+        asked = replace(asked, units=units or Run.steady_from(project.plain.period))
         warnings = announced(project.layout.product.warnings, out)
         made = report_on(project, asked, out.silent)
     write_text(output, made.text)

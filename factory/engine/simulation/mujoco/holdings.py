@@ -99,6 +99,11 @@ class Holdings:
         body = next(iter(self.held(holder).values()), None)
         return None if body is None else self._of[body].unit
 
+    @staticmethod
+    def code(robot: int) -> int:
+        """The code of a robot (index) as a holder."""
+        return robot_code(robot)
+
     def hand(self, robot: int) -> Mapping[str, int]:
         """The bodies in a robot's hand (index), by label."""
         return self.held(robot_code(robot))

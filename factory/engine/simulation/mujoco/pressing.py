@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,7 +26,9 @@ class Pressing:
     """The payloads that pads of robots and feeders may touch. `fallen`: bodies that lie about or
     askew in a feeder; `askew`: the latter, which press on nothing; `shaken`: bodies touched by
     fallen ones, with all in the same hands; `touched`: the pairs of geoms that involve any of
-    these."""
+    these; `PRESSED`: so deep may a part lie in a pad that holds it [m]."""
+
+    PRESSED: ClassVar[float] = PRESSED
 
     def __init__(self, m: mujoco.MjModel, model: Model, masks: ContactMasks) -> None:
         factory, layout = model.factory, model.layout

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from factory.engine.mjcf.model import Model
 from factory.engine.simulation.request import RunRequest
-from factory.theory.plant.demand import Word
+from factory.engine.timing.demand import Word
 
 
 class Supply:

@@ -12,12 +12,14 @@ from copy import copy
 from dataclasses import replace
 from functools import partial
 from math import ceil
+from typing import ClassVar
 
 from factory.engine.mjcf.loading import compiled, fingerprint, load
 from factory.engine.mjcf.model import Model
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import EngineView, Observation
 from factory.engine.simulation.mujoco.courses import Points
+from factory.engine.simulation.mujoco.drives import INPUTS
 from factory.engine.simulation.mujoco.fast.neighbours import Neighbours
 from factory.engine.simulation.mujoco.fast.strides import Strides
 from factory.engine.simulation.mujoco.inspection import Inspection
@@ -30,12 +32,12 @@ from factory.engine.simulation.mujoco.stepping import SingleSteps
 from factory.engine.simulation.mujoco.strokes import NEVER
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
+from factory.engine.timing.demand import Word
 from factory.support.arrays import Array, Index
 from factory.support.engine import by_name, mujoco
 from factory.support.settings import MOST
 from factory.theory.control.navigation import Bundle
 from factory.theory.nets.coordinated import Past
-from factory.theory.plant.demand import Word
 from factory.theory.plant.operation import Operation
 
 GIVEN_UP = tuple(
@@ -66,6 +68,8 @@ class MujocoWorld:
 
     Raises InputError (BadMesh) where the engine refuses the model, with the engine's own words.
     """
+
+    INPUTS: ClassVar[int] = INPUTS
 
     instant = False
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from factory.floor.layout.hands.hand import Hand
 from factory.floor.layout.hands.holding import Holding
 from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.places import Places
-from factory.floor.layout.hands.reach import back, halves
+from factory.floor.layout.hands.reach import back, halves, widths
 from factory.floor.layout.hands.surfaces import Way, swept
 from factory.support.arrays import Array, Truth
 from factory.theory.plant.operation import Operation
@@ -35,11 +36,24 @@ those below [m]."""
 
 
 class HandsApart:
-    """Hands of a factory's robots that could meet. `hand_of`: that of a carrier with a heading."""
+    """Hands of a factory's robots that could meet. `hand_of`: that of a carrier with a heading;
+    `BESIDE`: how far a hand stays to its own side of the line of another [m]."""
+
+    BESIDE: ClassVar[float] = BESIDE
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.hand_of = holding, hand_of
         self._middles: dict[tuple[int, int], float | None] = {}
+
+    @staticmethod
+    def widths(places: Places) -> Array:
+        """Widths (n,) of the fingers of the pads at places [m]."""
+        return widths(places.radius)
+
+    @staticmethod
+    def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
+        """Boxes from `low` to `high` (n, 3) [m], swept any distance along world directions."""
+        return swept(low, high, *ways)
 
     def over_fingers(self, kind: HandKind, places: Places) -> Truth:
         """Whether a hand behind stays over the fingers of those below (n,)."""

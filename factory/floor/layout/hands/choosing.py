@@ -14,15 +14,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TypeAlias
 
 import numpy as np
 
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.hands.apart import HandsApart
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.holding import Holding, held
-from factory.floor.layout.hands.in_the_way import InTheWay
+from factory.floor.layout.hands.in_the_way import InTheWay, Passed
+from factory.floor.layout.hands.kinds import HandKind
 from factory.floor.layout.hands.one_hand import OneHand
-from factory.floor.layout.hands.places import PUSH, centre_of
+from factory.floor.layout.hands.places import PUSH, Places
 from factory.floor.layout.hands.surfaces import Way
 from factory.floor.layout.stops import stops_of
 from factory.theory.plant.factory import Factory
@@ -87,6 +90,8 @@ class Hands:
     on its heading only, since those that deliver to it depend on its line; any other's depends on
     its frame.
 
+    Choices for robots that lie in other ways refine the classes of its steps.
+
     Args:
         factory: the factory.
         product: its solids.
@@ -94,9 +99,24 @@ class Hands:
         wanted: hands that robots (index) with one tour keep if these fit.
 
     Attributes:
+        Held: what robots hold, a step.
+        Apart: hands that could meet, a step.
+        Obstacles: all obstacles of hands, a step.
+        Choice: the choice of one robot's hand, a step.
+        Kind: kinds of hands.
+        Sites: places of a payload's surface.
+        Contacts: those of a hand with parts that it comes past.
         tours: the factory with a robot for each tour, for which hands are chosen.
         travels: least travels of robots (index), as layouts have shown [m].
     """
+
+    Held: TypeAlias = Holding
+    Apart: TypeAlias = HandsApart
+    Obstacles: TypeAlias = InTheWay
+    Choice: TypeAlias = OneHand
+    Kind: TypeAlias = HandKind
+    Contacts: TypeAlias = Passed
+    Sites: TypeAlias = Places
 
     def __init__(
         self,
@@ -209,5 +229,5 @@ class Hands:
 
     def _nowhere(self, label: str) -> Hand:
         """No hand, at the centre of mass of the payload."""
-        x, y, z = centre_of(self.holding.product, self.holding.factory.contents[label])[1].tolist()
+        x, y, z = self.holding.centre(label).tolist()
         return Hand.nothing((float(x), float(y), float(z)))

@@ -6,12 +6,13 @@ It touches places of the payload's surface with pads, and reaches there in the w
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 from factory.floor.layout.dimensions import FINGER
 from factory.floor.layout.hands.clamp import Clamp
-from factory.floor.layout.hands.kinds import ABOVE, BEHIND, NONE, HandKind
+from factory.floor.layout.hands.kinds import ABOVE, BEHIND, BELOW, NONE, HandKind
 from factory.floor.layout.hands.reach import SLENDER
-from factory.floor.layout.hands.tips import TipName
+from factory.floor.layout.hands.tips import STRONG, Tip, TipName, tip
 from factory.support.arrays import Array
 
 Point3 = tuple[float, float, float]
@@ -44,6 +45,9 @@ class Hand:
         clamp: the jaws that close over its tip; None without.
     """
 
+    BELOW: ClassVar[HandKind] = BELOW
+    STRONG: ClassVar[float] = STRONG
+
     kind: HandKind
     places: tuple[Point3, ...]
     radius: float = 0.003
@@ -64,6 +68,11 @@ class Hand:
     def on_face(cls, normal: Array, at: Point3, radius: float, tip: TipName) -> Hand:
         """A hand with one tip on a face with a normal (3,): from above, or from behind."""
         return cls(ABOVE if normal[2] else BEHIND, (at,), radius, tip=tip)
+
+    @staticmethod
+    def tip_of(kind: TipName) -> Tip:
+        """How strong a kind of tip is."""
+        return tip(kind)
 
     @property
     def half(self) -> float:

@@ -13,7 +13,7 @@ from factory.floor.geometry.turning import fed_of
 from factory.floor.layout.branches import carriers
 from factory.floor.layout.hands.hand import Hand, Point3
 from factory.floor.layout.hands.kinds import HandKind
-from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, places, resized
+from factory.floor.layout.hands.places import ASKED, PUSH, Loads, Places, centre_of, places, resized
 from factory.floor.layout.hands.surfaces import Surfaces, Way
 from factory.support.arrays import Array
 from factory.theory.plant.factory import Factory
@@ -141,6 +141,14 @@ class Holding:
             boxes = self.boxes(label)
             self._box[label] = np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
         return self._box[label]
+
+    def centre(self, label: str) -> Array:
+        """Centre of mass (3,) of a sub-assembly [m]."""
+        return centre_of(self.product, self.factory.contents[label])[1]
+
+    def held(self, robot: int, at_last: bool = False) -> str:
+        """The label that a robot takes first, or its last one; "" for a tool."""
+        return held(self.factory, robot, at_last)
 
     def top(self, operation: Operation) -> float:
         """Height of the result of an operation [m]."""

@@ -118,10 +118,18 @@ def _listed(labels: Sequence[str]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class NoGrip:
-    """A sub-assembly that no hand can hold: its `robot`, its `parts`, those `beside` them once it
-    is delivered, and the nearest miss of each kind that was tried. Where the robot brings others
-    too: the labels of all on its `line`; and if hands can hold each of these, but no hand all,
-    which of them each kind can (`ways`)."""
+    """A sub-assembly that no hand can hold.
+
+    Attributes:
+        label: of the sub-assembly.
+        robot: that takes it (index).
+        parts: its parts.
+        beside: the parts beside them once it is delivered.
+        misses: the nearest miss of each kind of hand that was tried.
+        position: where it is written.
+        line: all labels that the robot brings, where there are several.
+        ways: which of these each kind of hand can hold, where hands can hold each, but no hand all.
+    """
 
     label: str
     robot: str

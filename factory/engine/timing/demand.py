@@ -36,6 +36,18 @@ class Demand:
             return any(product == each and since <= number for each, since in self.changes)
         return self.orders[number : number + 1] != () and self.orders[number][0] == product
 
+    def word(
+        self,
+        sequence: Sequence[str],
+        most: int,
+        wip: int | None = None,
+        units: Sequence[int] = (),
+        fixed: int = 0,
+    ) -> Word:
+        """The word of a run for it: up to `most` units, of a net with the products of a period,
+        with the units that are known to be made as far as that is `fixed`."""
+        return Word(sequence, self, most, wip, [*units], fixed)
+
     @property
     def products(self) -> tuple[str, ...]:
         """All that is asked for, each product once."""

@@ -10,8 +10,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from factory.engine.record.history import firings
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.history import firings
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.undone import Entry, Joins, Undone
 
