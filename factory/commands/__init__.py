@@ -60,6 +60,13 @@ def print_code(code: str, as_json: bool) -> None:
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
+def _leave_to_the_system() -> None:
+    """No search for cycles in what goes with the process; but a library that would report what is
+    left of its own."""
+    if "manifold3d" not in sys.modules:
+        gc.freeze()
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """The entry point: runs a command and exits with its status, never with a traceback."""
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -67,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if not sys.warnoptions:  # what libraries warn programmers of is shown with `python -W default`
         simplefilter("ignore")
     stop_on_signals(interrupt)
-    atexit.register(gc.freeze)  # no search for cycles in what goes with the process
+    atexit.register(_leave_to_the_system)
     status = run_command(words)
     try:
         sys.stdout.flush()

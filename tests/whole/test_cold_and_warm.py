@@ -209,3 +209,13 @@ def test_a_net_from_elsewhere_needs_its_room(tmp_path: Path, cache: Path) -> Non
     net = tmp_path / "paper.pnml"
     assert not imported("export", PAPER, "--format", "pnml", "-o", net, cache=cache) & {*ASIDE}
     assert imported("check", net, cache=cache) >= {*ASIDE}
+
+
+def test_no_library_reports_what_the_end_of_the_process_takes() -> None:
+    """Volumes that are in a cycle of references are no leak."""
+    code = (
+        "from manifold3d import Manifold; kept = [Manifold.cube()]; kept.append(kept)\n"
+        "from factory.commands import main; main(['--version'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and done.stdout

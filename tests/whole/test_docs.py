@@ -91,7 +91,8 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, here: None) -> Pa
     """A folder with the examples, in which pictures are small; sweeps need no further process.
     Pages
     show what is printed without the extra `decompose`."""
-    monkeypatch.setattr("factory.floor.geometry.decomposition.can_decompose", lambda: False)
+    for module in ("decomposition", "drawn_solids"):
+        monkeypatch.setattr(f"factory.floor.geometry.{module}.can_decompose", lambda: False)
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("FACTORY_SIZE", "64x48")

@@ -268,7 +268,7 @@ def test_only_what_is_beside_an_open_mesh_is_decomposed(
             asked.append({node.label for node in pag.parts()})
         return made(pag, *words, **named)
 
-    monkeypatch.setattr(source, "can_decompose", lambda: True)
+    monkeypatch.setattr("factory.floor.geometry.drawn_solids.can_decompose", lambda: True)
     monkeypatch.setattr(source, "product_geometry", seen)
     found = read_source(tmp_path, TEMPLATES, SourceOptions("mm"))
     assert asked == [{"block2", "block3"}] and len(found.parts) == 4
