@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from itertools import cycle
 from pathlib import Path
 
@@ -103,6 +104,7 @@ def here(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     shutil.copytree(made, tmp_path / "here")
     monkeypatch.chdir(tmp_path / "here")
     monkeypatch.setattr(Project, "layout", property(_too_late))
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # of an exporter of one's own
     return tmp_path / "here"
 
 
