@@ -29,9 +29,9 @@ def _tree(pag: PAG) -> str | None:
 
 def _net(net: GearNet | MarkedNet, title: str = "net") -> str | None:
     from factory.apps.exports.svg import draw_net
-    from factory.theory.nets.marked import marked
+    from factory.theory.nets.marked import MarkedNet
 
-    made = marked(net)
+    made = MarkedNet.of(net)
     return draw_net(made, title) if len(made.tokens) <= LARGE else None
 
 

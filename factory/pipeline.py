@@ -19,7 +19,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.support.tables import MISFITS, misfit
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.expanding import expand
+from factory.theory.compiler.expanding import Node
 from factory.theory.compiler.turning import check_shapes, placed
 from factory.theory.lang.pag_reader import load_pag
 from factory.theory.lang.template_reader import all_templates, is_shipped
@@ -173,7 +173,7 @@ class Project:
     def _judged(self, as_drawn: bool) -> Matings:
         from factory.floor.mating.mating import matings
 
-        nodes = expand(self.pag, self.templates, self._single)
+        nodes = Node.expand(self.pag, self.templates, self._single)
         lowered = {**placed(nodes, self.catalogue), **self.lowered}
         return matings(nodes, self.product, True, lowered, as_drawn, self.axes)
 

@@ -90,7 +90,7 @@ def report(
     others are those of `run`. Raises InputError, RunError."""
     from factory.apps.report.page import report_on
     from factory.apps.runs.options import RunOptions
-    from factory.engine.simulation.run import steady_from
+    from factory.engine.simulation.run import Run
     from factory.support.bounds import check_values
     from factory.support.files import write_text
 
@@ -100,7 +100,7 @@ def report(
     log = _logged(product)
     source = log or project_of(product, settings)
     if not isinstance(source, Path):
-        asked = replace(asked, units=units or steady_from(source.plain.period))
+        asked = replace(asked, units=units or Run.steady_from(source.plain.period))
     made = report_on(source, asked, progress=progress)
     if output is not None:
         write_text(path_of(output), made.text)

@@ -22,7 +22,7 @@ from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.folding import sides_of
 from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
@@ -198,5 +198,5 @@ def pairs_of_tours(factory: Factory) -> Iterator[tuple[int, int, int]]:
 def simulated_cycle(net: GearNet, seconds: list[float], rounds: int = 60) -> float:
     """The mean time between two products in the long run, by the token game. Exact where the number
     of rounds is a multiple of the period."""
-    fired = dates(marked(net), seconds, 3 * rounds)
+    fired = dates(MarkedNet.of(net), seconds, 3 * rounds)
     return max(row[-1] - row[-1 - rounds] for row in fired) / rounds

@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import product
 
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking, PetriNet, Place, Transition
 from factory.theory.nets.threaded import ThreadedNet
 from tests.token_game import enabled, follower
@@ -108,7 +108,7 @@ def rebuilt(net: GearNet, places: tuple[Place, ...], tokens: tuple[int, ...]) ->
 
 def lost_token(net: GearNet, robot: int) -> MarkedNet:
     """Without the token of one robot."""
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     gone = net.initial[robot]
     tokens = tuple(0 if p == gone else t for p, t in enumerate(subject.tokens))
     return replace(subject, tokens=tokens)
@@ -116,7 +116,7 @@ def lost_token(net: GearNet, robot: int) -> MarkedNet:
 
 def doubled_token(net: GearNet, robot: int) -> MarkedNet:
     """With a second token in one robot's gear, on another place of it alone if there is one."""
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     other = next(
         (p for p in net.gears[robot].places[1:] if net.slots[p] == (robot,)), net.initial[robot]
     )
@@ -128,7 +128,7 @@ def missing_producer(net: GearNet, place: int) -> MarkedNet:
     """With nothing that marks one place."""
     places = list(net.threaded.places)
     places[place] = replace(places[place], left=())
-    return rebuilt(net, tuple(places), marked(net).tokens)
+    return rebuilt(net, tuple(places), MarkedNet.of(net).tokens)
 
 
 def unclosed_gear(net: GearNet, robot: int, step: int, event: int) -> MarkedNet:
@@ -136,13 +136,13 @@ def unclosed_gear(net: GearNet, robot: int, step: int, event: int) -> MarkedNet:
     places = list(net.threaded.places)
     place = net.gears[robot].places[step]
     places[place] = replace(places[place], right=(event,))
-    return rebuilt(net, tuple(places), marked(net).tokens)
+    return rebuilt(net, tuple(places), MarkedNet.of(net).tokens)
 
 
 def crossed_twice(net: GearNet, one: int, other: int) -> MarkedNet | None:
     """With two robots that meet sharing a second place: an operation that one does alone becomes
     one of both, spliced into the other's gear. None where there is no such operation."""
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     alone = [p for p in net.gears[one].places if net.slots[p] == (one,)]
     alone = [p for p in alone if net.threaded.places[p].mode not in ("wait", "hold")]
     waits = [p for p in net.gears[other].places if net.slots[p] == (other,)]

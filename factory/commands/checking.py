@@ -12,7 +12,7 @@ from factory.engine.timing.pool import part_pool
 from factory.pipeline import Project
 from factory.support.errors import Diagnostic
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Place
 from factory.theory.nets.verdict import Verdict
 from factory.theory.nets.verify import verify
@@ -53,7 +53,7 @@ class Checked:
     def counts(self) -> dict[str, int]:
         """The numbers of robots, places, transitions and tokens, and the size of the largest
         mode."""
-        subject = marked(self.net)
+        subject = MarkedNet.of(self.net)
         return {
             "robots": len(self.verdict.gears),
             "places": len(subject.net.places),
@@ -64,7 +64,7 @@ class Checked:
 
     def gears(self, most: int | None = None) -> Iterator[dict[str, Any]]:
         """The gears as `check --json` lists them: all, or `most` of them."""
-        places = marked(self.net).net.places
+        places = MarkedNet.of(self.net).net.places
         return (_gear_json(gear, places) for gear in self.verdict.gears[:most])
 
     def as_json(self) -> dict[str, Any]:

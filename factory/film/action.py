@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from factory.engine.mjcf import names
 from factory.engine.mjcf.replica import Geoms, Replica
-from factory.engine.mjcf.weld_frames import WeldFrames, joints_of
+from factory.engine.mjcf.weld_frames import WeldFrames
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 from factory.support.pictures.sight import View
@@ -234,7 +234,7 @@ def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
     chains = np.setdiff1d(m.body_rootid[hinges], m.body_rootid[slides])
     for g in np.flatnonzero(np.isin(roots, [*moving, *chains])).tolist():
         root, body = int(roots[g]), int(m.geom_bodyid[g])
-        if root not in chains or len(joints_of(m, body)) <= ELBOW:
+        if root not in chains or len(WeldFrames.joints_of(m, body)) <= ELBOW:
             yield (root, "body"), placed(m, d, g)
 
 

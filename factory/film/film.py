@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from factory.engine.mjcf.model import product_name
+from factory.engine.mjcf.model import Model
 from factory.engine.record.state import Recorder, State
 from factory.engine.record.subject import MonitorSubject
 from factory.film.action import Snapshot, held
@@ -31,7 +31,7 @@ class _Observer(Recorder):
         picture.check(factory.pag)
         subject = MonitorSubject.of_run(simulation)
         m, made, self.history = simulation.physical.m, simulation.model, History(subject)
-        name, units = product_name(factory), simulation.request.units
+        name, units = Model.product_name(factory), simulation.request.units
         self.take = Take(m, made.xml, made.files, subject, name, units, picture, self.history)
         self.last = self._moment(simulation.state())
 

@@ -27,7 +27,7 @@ from factory.pipeline import read
 from factory.theory.nets import exclusion
 from factory.theory.nets.coordinated import CoordinatedNet
 from factory.theory.nets.exclusion import ORDER, _Arc, _Paths, excluding, ordered
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.nets.threaded import ThreadedNet, Threads
 from factory.theory.plant.factory import Factory
@@ -255,7 +255,7 @@ def product_of(seed: int, folder: Path) -> Layout:
 @pytest.mark.parametrize("seed", slow_but([0, 1], range(6)))
 def test_it_is_the_compiled_net_with_more_that_restricts_it(seed: int, tmp_path: Path) -> None:
     layout = product_of(1200 + seed, tmp_path)
-    net, compiled = coordinated(layout), marked(layout.factory.net)
+    net, compiled = coordinated(layout), MarkedNet.of(layout.factory.net)
     assert net.net.net.places[: len(compiled.tokens)] == compiled.net.places
     assert net.net.tokens[: len(compiled.tokens)] == compiled.tokens
     assert net.net.is_marked_graph and not net.deadlock

@@ -11,7 +11,7 @@ from itertools import combinations
 import pytest
 
 from factory.theory.nets.exclusion import ORDER, excluding, ordered, times
-from factory.theory.nets.marked import MarkedNet, stuck_circuit, token_free
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from tests.slow import slow_but
 from tests.state_space import Truth, explored
@@ -163,7 +163,7 @@ def try_programs(count: int) -> tuple[int, int, int, int]:
     for rng, program in programs(count):
         made = ordered(program.net, program.alone, program.pairs)
         assert {*made.places} == {*program.pairs}, "the run alone never has two robots in one cell"
-        assert not token_free(made.net).stuck
+        assert not made.net.token_free.stuck
         for (p, q), circuit in zip(program.pairs, excluding(made.net, program.pairs), strict=True):
             assert circuit is not None
             assert {p, q} <= {*circuit}
@@ -176,9 +176,9 @@ def try_programs(count: int) -> tuple[int, int, int, int]:
         alone += stalls(program, program.net, rng)
         net = swapped(program, rng.choice(program.pairs))
         tried += 1
-        if stuck := token_free(net).stuck:
+        if stuck := net.token_free.stuck:
             dead += 1
-            circuit = stuck_circuit(net, stuck)
+            circuit = net.stuck_circuit(stuck)
             assert not any(net.tokens[place] for place in circuit)
             ends = zip(circuit, circuit[1:] + circuit[:1], strict=True)
             assert all(net.right[a] == net.left[b] for a, b in ends)

@@ -31,7 +31,7 @@ from factory.floor.layout.durations import Pace
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import proved, verify
 from factory.theory.plant.factory import Factory
@@ -59,7 +59,7 @@ SMALL = 1_200
 
 
 def starting_at(net: GearNet, marking: Marking) -> MarkedNet:
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     tokens = tuple(int(place in marking) for place in range(len(subject.tokens)))
     return MarkedNet(subject.net, tokens, subject.gears, subject.slots)
 
@@ -82,7 +82,7 @@ def folds_are_live(seeds: range, size: int) -> tuple[int, int]:
         assert factory.order[-1] == factory.dropoff.index
         shared += factory.folded
         if len(factory.operations) < 12:
-            truth = explored(marked(factory.net), SMALL)
+            truth = explored(MarkedNet.of(factory.net), SMALL)
             assert truth is None or truth.behaviour == (True, True, True), seed
             small += truth is not None
     return shared, small
@@ -117,7 +117,7 @@ def swapped_tours_are_refused(seeds: range, size: int) -> tuple[int, int, int]:
             pairs += 1
             tools += factory.robots[robot].type == "tool"
             if len(factory.operations) < 12 and small < 400:
-                truth = explored(marked(net), SMALL)
+                truth = explored(MarkedNet.of(net), SMALL)
                 assert truth is None or truth.behaviour == judged(net), (seed, robot, one, other)
                 small += truth is not None
     return pairs, tools, small
@@ -251,7 +251,7 @@ def test_of_fifty_legal_markings_of_three_robots_24_are_dead() -> None:
         with pytest.raises(ValueError, match="contradicts the others"):
             firings(net, marking)
     assert (len(markings), dead) == (50, 24)
-    truth = explored(marked(net))
+    truth = explored(MarkedNet.of(net))
     assert truth is not None and len(truth.markings) == 26
 
 

@@ -28,7 +28,7 @@ from factory.floor.mating.mating import judged as without_lifts
 from factory.floor.mating.mating import matings
 from factory.floor.mating.paths import LAST, NEAR, depths_of, sought
 from factory.support.errors import Diagnostic
-from factory.theory.compiler.expanding import expand
+from factory.theory.compiler.expanding import Node
 from factory.theory.lang import read_pag
 from factory.theory.lang.pag_reader import load_pag
 from factory.theory.lang.template_reader import all_templates
@@ -76,7 +76,7 @@ def plate(hole: float, axis: int, size: float = 30, thick: float = 5) -> list[np
 def judged(text: str, **pieces: list[np.ndarray]) -> Matings:
     """The matings of a PAG whose parts `pieces` are made of these convex bodies."""
     pag, product = made_of(text, **pieces)
-    return matings(expand(pag, TEMPLATES), product)
+    return matings(Node.expand(pag, TEMPLATES), product)
 
 
 def made_of(text: str, **pieces: list[np.ndarray]) -> tuple[PAG, Product]:
@@ -344,10 +344,10 @@ def test_a_file_where_the_folder_should_be_is_refused(run: Terminal, closed: Pat
 def test_a_picture_is_the_same_every_time_and_survives_odd_labels() -> None:
     pag = read_pag(CLOSED.replace("front", "fé"), TEMPLATES)
     product = product_geometry(pag)
-    found = matings(expand(pag, TEMPLATES), product)
+    found = matings(Node.expand(pag, TEMPLATES), product)
     (mating,) = found.of_kind("blocked")
     picture = draw(mating, found, product)
-    assert picture == draw(mating, matings(expand(pag, TEMPLATES), product), product)
+    assert picture == draw(mating, matings(Node.expand(pag, TEMPLATES), product), product)
     odd = ElementTree.fromstring(draw(replace(mating, label="<&>" + "x" * 90), found, product))
     assert "<&>xxxx" in "".join(odd.itertext())
 
@@ -382,7 +382,7 @@ def test_a_way_that_cuts_is_not_clean_however_deep_parts_are(tmp_path: Path) -> 
     pag = load_pag(tmp_path / "r.pag", all_templates())
     product = product_geometry(pag)
     assert overlaps_of(product).pairs[0].depth == pytest.approx(1.5e-3, rel=0.05)
-    nodes = expand(pag, all_templates())
+    nodes = Node.expand(pag, all_templates())
     (made,) = matings(nodes, product).all
     assert made.approach.told == "pin is lowered 0.035 m"
     assert (made.slide, made.lower) == (Level.LEFT_OUT, Level.NO_DEEPER)

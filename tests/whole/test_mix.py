@@ -18,7 +18,7 @@ from factory.theory.compiler.mixing import even, orders
 from factory.theory.lang.pag_reader import read_pag
 from factory.theory.lang.template_reader import all_templates
 from factory.theory.lang.writer import write_pag
-from factory.theory.nets.marked import marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verify import verify
 from factory.theory.problem.pag import PAG, Mix
 from factory.theory.problem.plan import Plan
@@ -112,7 +112,7 @@ def test_random_families_are_certified_and_explored() -> None:
         assert pag.mix is not None and factory.sequence == pag.mix.sequence
         assert check_certificate(json.loads(json.dumps(certificate(factory.net, verdict)))) == []
         if len(factory.operations) < 18:
-            truth = explored(marked(factory.net), 6_000)
+            truth = explored(MarkedNet.of(factory.net), 6_000)
             assert truth is None or truth.behaviour == (True, True, True)
         for robot, one, other in pairs_of_tours(factory):
             found = verify(swapped(factory, robot, one, other))

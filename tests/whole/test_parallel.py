@@ -20,7 +20,7 @@ from factory.floor.robots.catalogue import load_catalogue
 from factory.pipeline import Project, read
 from factory.support.errors import InputError
 from factory.theory.lang.template_reader import all_templates
-from factory.theory.nets.marked import marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG, Parameter
@@ -58,7 +58,7 @@ def replicated(k: int, label: str = "sub2") -> Factory:
 
 def truth(factory: Factory, limit: int = 150_000) -> tuple[bool, bool, bool]:
     """Live, safe and reversible, by every marking."""
-    found = explored(marked(factory.net), limit)
+    found = explored(MarkedNet.of(factory.net), limit)
     assert found is not None
     return found.behaviour
 

@@ -14,7 +14,7 @@ from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.pool import part_pool
 from factory.support.errors import InputError
 from factory.theory.nets.cycle_ratio import max_cycle_ratio
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.plant.factory import Factory
 from tests.examples import without_hands
 from tests.net_values import net_from
@@ -50,7 +50,7 @@ def test_the_papers_pools() -> None:
     factory = factory_of(paper())
     assert dict(part_pool(factory)) == {"part1": 3, "part2": 3, "part3": 2}
     assert dict(part_pool(factory, 2)) == {"part1": 2, "part2": 2, "part3": 2}
-    assert most_inside(factory, marked(factory.net)) == dict(part_pool(factory))
+    assert most_inside(factory, MarkedNet.of(factory.net)) == dict(part_pool(factory))
 
 
 def test_wip_below_one_is_refused() -> None:
@@ -80,7 +80,7 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     count = len(factory.net.threaded.places)
     delays = data.draw(st.lists(st.integers(0, 50), min_size=count, max_size=count))
     seconds = [float(d) for d in delays]
-    found = max_cycle_ratio(marked(factory.net), seconds)
+    found = max_cycle_ratio(MarkedNet.of(factory.net), seconds)
     assert found.seconds == pytest.approx(CycleTime.of(factory.net, seconds).seconds)
     gears = {frozenset(gear.places) for gear in factory.net.gears}
     assert frozenset(found.circuit) in gears

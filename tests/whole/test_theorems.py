@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from factory.apps.foreign_nets.behaviour import analyse
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Marking
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
@@ -20,7 +20,7 @@ from tests.state_space import explored
 
 def starting_at(factory: Factory, marking: Marking) -> MarkedNet:
     """The factory's net with another initial marking."""
-    net = marked(factory.net)
+    net = MarkedNet.of(factory.net)
     tokens = tuple(int(p in marking) for p in range(len(net.tokens)))
     return MarkedNet(net.net, tokens, net.gears, net.slots)
 
@@ -42,7 +42,7 @@ def test_theorems_3_1_and_3_2_by_brute_force(factory: Factory, rng: random.Rando
 
 def test_the_paper_has_342_markings_all_legal() -> None:
     factory = factory_of(paper())
-    truth = explored(marked(factory.net))
+    truth = explored(MarkedNet.of(factory.net))
     assert truth is not None
     assert len(truth.markings) == 342 == len(legal_markings(factory.net))
 
@@ -78,5 +78,5 @@ def test_lemma_5_1(many: list[Factory], rng: random.Random) -> None:
     places = [rng.choice(factory.operations).place for factory in many]
     net = glued(nets, places)
     assert verify(net).holds
-    subject = marked(net)
+    subject = MarkedNet.of(net)
     assert analyse(MarkedNet(subject.net, subject.tokens)).holds

@@ -15,7 +15,6 @@ import pytest
 from factory.floor.modes.modes import operation_modes
 from factory.support.settings import Settings
 from factory.theory.nets.exclusion import excluding
-from factory.theory.nets.marked import stuck_circuit, token_free
 from tests.net_values import net_from
 from tests.paths import ROOT
 from tools.figures.all import FIGURES, compiled, layout
@@ -61,13 +60,13 @@ def test_the_two_teeth_are_dead_by_the_circuit_in_red() -> None:
     waits = [(before, after, tokens) for before, after, *_, tokens in WAITS]
     net = net_from(teeth + waits)
     red = {place for place, tokens in enumerate(net.tokens) if not tokens}
-    assert {*stuck_circuit(net, token_free(net).stuck)} == red
+    assert {*net.stuck_circuit(net.token_free.stuck)} == red
 
 
 def test_the_order_places_exclude_by_one_token() -> None:
     gears = [("a", "b", 0), ("b", "a", 1), ("c", "d", 0), ("d", "c", 1)]
     net = net_from([*gears, *ORDER])
-    assert not token_free(net).stuck
+    assert not net.token_free.stuck
     (circuit,) = excluding(net, [(0, 2)])
     assert circuit is not None and {*circuit} == {0, 2, 4, 5}
     assert excluding(net_from(gears), [(0, 2)]) == [None]

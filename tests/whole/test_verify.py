@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from factory.apps.foreign_nets.behaviour import analyse
 from factory.apps.foreign_nets.explore import explore
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verdict import Verdict, Witness
 from factory.theory.plant.factory import Factory
 from tests.net_values import PHILOSOPHERS, crossed_twice, net_from, planted
@@ -22,7 +22,7 @@ from tests.state_space import explored
 
 def bare(net: GearNet | MarkedNet) -> MarkedNet:
     """The net without any word about gears."""
-    return replace(marked(net), gears=(), slots=())
+    return replace(MarkedNet.of(net), gears=(), slots=())
 
 
 def witness(verdict: Verdict, kind: str) -> Witness:
@@ -35,11 +35,11 @@ def witness(verdict: Verdict, kind: str) -> Witness:
 @given(factories(9))
 @settings(max_examples=25)
 def test_agrees_with_brute_force(factory: Factory) -> None:
-    truth = explored(marked(factory.net), 2_000)
+    truth = explored(MarkedNet.of(factory.net), 2_000)
     assume(truth is not None)
     assert truth is not None
     assert truth.behaviour == (True, True, True)
-    found = explore(marked(factory.net))
+    found = explore(MarkedNet.of(factory.net))
     assert found.markings == len(truth.markings)
     assert found.complete
     assert (found.deadlock, found.unsafe, found.starved, found.one_way) == (None,) * 4
@@ -117,7 +117,7 @@ def test_slots_of_a_marked_place_that_are_not_of_the_robots_there() -> None:
     net = factory_of(paper()).net
     place = net.initial[2]
     changed = (*net.slots[:place], (), *net.slots[place + 1 :])
-    for subject in (replace(net, slots=changed), replace(marked(net), slots=changed)):
+    for subject in (replace(net, slots=changed), replace(MarkedNet.of(net), slots=changed)):
         verdict = analyse(subject)
         assert verdict.legal is False
         last = verdict.witness[-1]

@@ -22,7 +22,7 @@ from factory.floor.layout.clearance import certify
 from factory.floor.mating.mating import matings
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
-from factory.theory.compiler.expanding import expand
+from factory.theory.compiler.expanding import Node
 from factory.theory.lang.pag_reader import read_pag
 from factory.theory.lang.template_reader import all_templates
 from factory.theory.plant.approaches import MARGIN
@@ -102,7 +102,7 @@ def test_a_catalogue_without_lifts_is_told() -> None:
 
     templates = all_templates()
     pag = read_pag(FENCE, templates)
-    found = matings(expand(pag, templates), product_geometry(pag)).approaches
+    found = matings(Node.expand(pag, templates), product_geometry(pag)).approaches
     with pytest.raises(InputError, match="must be lowered, and a 'dot' has no lift"):
         compile_pag(pag, templates, catalogue(), found)
 

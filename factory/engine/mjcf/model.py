@@ -109,13 +109,17 @@ class Model:
 
     @staticmethod
     def product_name(factory: Factory) -> str:
-        """The name of a model: that of the PAG file, without folder and ending."""
-        return product_name(factory)
+        """The name of the model: that of the PAG file, without folder and ending."""
+        name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
+        return name or "factory"
 
     @staticmethod
     def memory_of(root: Element) -> int:
-        """The engine's memory for a model, by its root element [MiB]."""
-        return memory_of(root)
+        """The engine's memory for a model, by its root element [MiB]: ARENA, and what its broad
+        phase sets aside, two arrays with four bytes for each pair of bodies. Only what is written
+        to is taken from the machine's."""
+        bodies = sum(1 for _ in root.iter("body")) + 1
+        return ARENA + 2 * 4 * bodies * (bodies - 1) // 2 // 2**20
 
     @property
     def reservations(self) -> tuple[str, ...]:
@@ -198,7 +202,7 @@ def build_model(
     }
     drives = tuple(axis.drive(settings) for axis in driven_axes(layout, masses, settings))
     root = ElementTree.parse(SKELETON).getroot()
-    root.set("model", product_name(factory))
+    root.set("model", Model.product_name(factory))
     section = {child.tag: child for child in root}
     world, equality, actuator = (section[tag] for tag in ("worldbody", "equality", "actuator"))
     fill(section["option"], timestep=settings.step)
@@ -229,25 +233,12 @@ def build_model(
         root.remove(section["contact"])
     if not shown:
         leave_out_what_is_shown(root)
-    fill(section["size"], memory=f"{memory_of(root)}M")
+    fill(section["size"], memory=f"{Model.memory_of(root)}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.axes) + 2 + len(sliders) + jaws + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
-
-
-def memory_of(root: Element) -> int:
-    """The engine's memory for a model [MiB]: ARENA, and what its broad phase sets aside, two arrays
-    with four bytes for each pair of bodies. Only what is written to is taken from the machine's."""
-    bodies = sum(1 for _ in root.iter("body")) + 1
-    return ARENA + 2 * 4 * bodies * (bodies - 1) // 2 // 2**20
-
-
-def product_name(factory: Factory) -> str:
-    """The name of the model: that of the PAG file, without folder and ending."""
-    name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
-    return name or "factory"
 
 
 def _sliders(

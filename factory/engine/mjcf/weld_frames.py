@@ -90,7 +90,7 @@ class WeldFrames:
     def _chained(self, m: mujoco.MjModel, d: mujoco.MjData, held: Array, turn: Array) -> WeldFrames:
         """The same with the welds of holders at the end of longer chains, which are at `held`
         (n, 3), turned by `turn` (n, 4) now."""
-        chains = {int(b): chain_of(m, int(b)) for b in np.unique(m.eq_obj1id)}
+        chains = {int(b): WeldFrames.chain_of(m, int(b)) for b in np.unique(m.eq_obj1id)}
         deep = np.array([bool(chains[int(b)]) for b in m.eq_obj1id], bool)
         if not deep.any():
             return self
@@ -114,12 +114,22 @@ class WeldFrames:
     @staticmethod
     def joints_of(m: mujoco.MjModel, body: int) -> list[int]:
         """The joints that slide or turn a body, from the base on."""
-        return joints_of(m, body)
+        joints = list[int]()
+        while body:
+            first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
+            joints = [*range(first, first + count), *joints]
+            body = int(m.body_parentid[body])
+        return [j for j in joints if m.jnt_type[j] in (SLIDE, HINGE)]
 
     @staticmethod
     def chain_of(m: mujoco.MjModel, body: int) -> list[int]:
-        """The joints of a holder at the end of a chain, from the base on; else none."""
-        return chain_of(m, body)
+        """The joints of a holder at the end of a chain, from the base on; none of one that slides,
+        on what slides, or turns about the vertical there."""
+        joints = WeldFrames.joints_of(m, body)
+        hinges = [j for j in joints if m.jnt_type[j] == HINGE]
+        upright = all(j == joints[-1] and abs(m.jnt_axis[j, 2]) == 1.0 for j in hinges)
+        few = len(joints) <= SHALLOW and len({*m.jnt_bodyid[joints].tolist()}) <= 2
+        return [] if few and upright else joints
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""
@@ -177,26 +187,6 @@ def _joints(m: mujoco.MjModel, d: mujoco.MjData) -> tuple[Index, Array, Array, A
     way = np.where(slides[:, :, None], d.xaxis[joint], 0.0)
     spin = np.where(turns, d.xaxis[joints[:, 0]][:, 2].round(), 0.0)
     return m.jnt_qposadr[joint], way, d.xanchor[joints[:, 0]], spin
-
-
-def joints_of(m: mujoco.MjModel, body: int) -> list[int]:
-    """The joints that slide or turn a body, from the base on."""
-    joints = list[int]()
-    while body:
-        first, count = int(m.body_jntadr[body]), int(m.body_jntnum[body])
-        joints = [*range(first, first + count), *joints]
-        body = int(m.body_parentid[body])
-    return [j for j in joints if m.jnt_type[j] in (SLIDE, HINGE)]
-
-
-def chain_of(m: mujoco.MjModel, body: int) -> list[int]:
-    """The joints of a holder at the end of a chain, from the base on; none of one that slides, on
-    what slides, or turns about the vertical there."""
-    joints = joints_of(m, body)
-    hinges = [j for j in joints if m.jnt_type[j] == HINGE]
-    upright = all(j == joints[-1] and abs(m.jnt_axis[j, 2]) == 1.0 for j in hinges)
-    few = len(joints) <= SHALLOW and len({*m.jnt_bodyid[joints].tolist()}) <= 2
-    return [] if few and upright else joints
 
 
 def held_at(m: mujoco.MjModel, welds: Index, xpos: Array, xmat: Array) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.engine.record.figures import PhysicsFigures
-from factory.engine.simulation.run import STEADY, Run, steady_from
+from factory.engine.simulation.run import STEADY, Run
 from factory.support.console import POOL_BOUND
 from factory.support.progress import paced
 
@@ -21,7 +21,7 @@ def figures(record: Run, verbose: bool = False) -> Iterator[str]:
     cycle = "not yet steady"
     if record.cycle_time_s is not None:
         cycle = f"{record.cycle_time_s:.3f} s"
-    elif (least := steady_from(record.period)) > STEADY:
+    elif (least := Run.steady_from(record.period)) > STEADY:
         cycle = f"measured from {least} units on (two periods of {record.period})"
     each = [f"{count} {product}" for product, count in record.by_product.items()]
     yield (

@@ -17,7 +17,7 @@ from factory.engine.record.verdict import RunVerdict
 from factory.support.errors import Diagnostic, RunError
 from factory.support.showing import drawn
 from factory.theory.nets.petri import Marking
-from factory.theory.nets.undone import Entry, Undone, lasting
+from factory.theory.nets.undone import Entry, Undone
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.ids import is_end, operation_of
 
@@ -29,39 +29,6 @@ def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
 
 STEADY = 4
 """Number of products from which on a cycle time is measured: the last half has two intervals."""
-
-
-def steady_from(period: int = 1) -> int:
-    """The number of products from which on a cycle time is measured, so that the last half of them
-    has a whole period (a number of units)."""
-    return max(STEADY, 2 * period if period > 1 else 0)
-
-
-def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
-    """Mean interval [s] between these times of departure over the whole periods of units in their
-    last half; None for fewer than `steady_from`."""
-    if len(left) < steady_from(period):
-        return None
-    tail = left[len(left) // 2 - 1 :]
-    count = len(tail) - 1
-    count -= count % period
-    return (tail[-1] - tail[-1 - count]) / count
-
-
-def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
-    """Time that each robot spent in completed operations [s]. An operation without a start event
-    was under way at time 0."""
-    numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
-    begun, spent = dict[int, float](), [0.0] * len(factory.robots)
-    for t, transition in (event for event in events if isinstance(event, Event)):
-        operation, ends = operation_of(numbers[transition]), is_end(numbers[transition])
-        if not ends:
-            begun[operation] = t
-            continue
-        lasted = t - begun.pop(operation, 0.0)
-        for robot in factory.operations[operation].robots:
-            spent[robot] += lasted
-    return tuple(spent)
 
 
 @dataclass(frozen=True)
@@ -144,19 +111,36 @@ class Run:
 
     @staticmethod
     def steady_from(period: int = 1) -> int:
-        """The number of products from which on a cycle time is measured, where so many units are
-        made in a cycle of the net."""
-        return steady_from(period)
+        """The number of products from which on a cycle time is measured, so that the last half of
+        them has a whole period (a number of units)."""
+        return max(STEADY, 2 * period if period > 1 else 0)
 
     @staticmethod
     def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
-        """Mean interval [s] between times of departure in the long run; None for too few."""
-        return mean_interval(left, period)
+        """Mean interval [s] between these times of departure over the whole periods of units in
+        their last half; None for fewer than `steady_from`."""
+        if len(left) < Run.steady_from(period):
+            return None
+        tail = left[len(left) // 2 - 1 :]
+        count = len(tail) - 1
+        count -= count % period
+        return (tail[-1] - tail[-1 - count]) / count
 
     @staticmethod
     def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
-        """Time that each robot spent in completed operations [s]."""
-        return busy_times(factory, events)
+        """Time that each robot spent in completed operations [s]. An operation without a start
+        event was under way at time 0."""
+        numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
+        begun, spent = dict[int, float](), [0.0] * len(factory.robots)
+        for t, transition in (event for event in events if isinstance(event, Event)):
+            operation, ends = operation_of(numbers[transition]), is_end(numbers[transition])
+            if not ends:
+                begun[operation] = t
+                continue
+            lasted = t - begun.pop(operation, 0.0)
+            for robot in factory.operations[operation].robots:
+                spent[robot] += lasted
+        return tuple(spent)
 
     @property
     def fired(self) -> int:
@@ -166,7 +150,7 @@ class Run:
     @cached_property
     def lasting(self) -> tuple[Event, ...]:
         """The firings that were not undone; they too are a run of the net."""
-        kept = lasting(entries_of(self.events))
+        kept = Undone.lasting(entries_of(self.events))
         return tuple(e for e in (self.events[at] for at in kept) if isinstance(e, Event))
 
     @property
@@ -204,7 +188,7 @@ class Run:
     def cycle_time_s(self) -> float | None:
         """Mean interval between dropoffs over the whole periods in the last half of the units; None
         for fewer than `steady_from`, and while the pace is settling."""
-        return None if self.settling else mean_interval(self.dropoffs, self.period)
+        return None if self.settling else Run.mean_interval(self.dropoffs, self.period)
 
     @property
     def cycle_time_missing(self) -> str | None:
@@ -213,7 +197,7 @@ class Run:
             return None
         if self.settling:
             return f"{len(self.dropoffs)} products; by the timed net their pace is not yet steady"
-        least = steady_from(self.period)
+        least = Run.steady_from(self.period)
         periods = f", two periods of {self.period}" if least > STEADY else ""
         return f"{len(self.dropoffs)} products; a cycle time is measured from {least} on{periods}"
 

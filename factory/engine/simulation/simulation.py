@@ -19,7 +19,7 @@ from factory.engine.simulation.ideal import IdealWorld
 from factory.engine.simulation.modelling import modelled
 from factory.engine.simulation.ordering import Ordering
 from factory.engine.simulation.request import RunRequest
-from factory.engine.simulation.run import Run, busy_times, entries_of, mean_interval
+from factory.engine.simulation.run import Run, entries_of
 from factory.engine.simulation.run_supervisor import RunSupervisor
 from factory.engine.simulation.supervisor import Supervisor
 from factory.engine.simulation.world import World
@@ -298,7 +298,7 @@ class Simulation:
             verdict.refines,
             tuple(supervisor.events),
             tuple(world.dropoffs),
-            busy_times(factory, supervisor.events),
+            Run.busy_times(factory, supervisor.events),
             figures
             and replace(
                 figures,
@@ -318,13 +318,13 @@ class Simulation:
         """Whether products that `left` at other intervals than those of the long run were to do so
         by the timed net."""
         wip, period, pace = self.request.wip, self.layout.factory.period, self.cycle.seconds
-        measured = mean_interval(left, period)
+        measured = Run.mean_interval(left, period)
         if measured is None or self.request.demand or self.supervisor.scans:
             return False
         if len(left) > SETTLED or abs(measured / pace - 1) < AGREES:
             return False
         net = Timed.of(self.timing, wip=wip)
-        foretold = mean_interval(net.departures(len(left)), period)
+        foretold = Run.mean_interval(net.departures(len(left)), period)
         return foretold is not None and abs(foretold / pace - 1) >= AGREES
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:

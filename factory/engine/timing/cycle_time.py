@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from factory.support.errors import Diagnostic, did_you_mean
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.ways import train_ratio
 from factory.theory.plant.factory import Factory
 
@@ -56,7 +56,7 @@ class CycleTime:
         """
         net = subject.net if isinstance(subject, Factory) else subject
         units = subject.period if isinstance(subject, Factory) else 1
-        seconds = _seconds(marked(net), delays)
+        seconds = _seconds(MarkedNet.of(net), delays)
         if not net.is_tree:
             ratio, (robot, *_) = train_ratio(net, seconds, ways)
             return cls(ratio.seconds / units, net.gears[robot].robot)

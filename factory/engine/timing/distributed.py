@@ -18,7 +18,6 @@ from factory.engine.timing.timing import AS_IT_IS
 from factory.theory.control.governed import Trajectory
 from factory.theory.control.mode import STILL
 from factory.theory.nets.coordinated import Past
-from factory.theory.nets.marked import token_free
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.ids import is_end, operation_of
 
@@ -78,7 +77,7 @@ class ScannedTimes:
         waits = self._waits()
         dates, left = dict[tuple[int, int], float](), list[int]()
         for period in range(-(-MADE // factory.period)):
-            for event in token_free(net).order:
+            for event in net.token_free.order:
                 date = 0.0
                 for place in net.net.preset[event]:
                     before = net.left[place], period - net.tokens[place]

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.support.arrays import Array
-from factory.theory.nets.marked import NONE, MarkedNet, token_free
+from factory.theory.nets.marked import NONE, MarkedNet
 
 
 def earliest_firings(
@@ -24,7 +24,7 @@ def earliest_firings(
     time 0 or at `ready[p]`, or the token of the producer's firing k - tokens, available
     `seconds[p]` later; `first[p]` is the delay of the first such token if it differs. Raises
     ValueError if the net is not a live marked graph."""
-    free = token_free(net)
+    free = net.token_free
     fed = all(b != NONE or a == NONE for b, a in zip(net.left, net.right, strict=True))
     if not (fed and net.is_marked_graph) or free.stuck:
         raise ValueError("only a live marked graph fires for ever")

@@ -14,7 +14,6 @@ from factory.engine.timing.demand import Word
 from factory.engine.timing.distributed import Scan, ScannedTimes
 from factory.engine.timing.timed import Timed
 from factory.engine.timing.timing import Timing
-from factory.theory.nets.marked import token_free
 
 
 def cycle_of(
@@ -50,7 +49,7 @@ class WordTimes:
         served = self.timed.timing.coordinated.served.values()
         first = {o.start for o in factory.leaves} | {net.right[one.top] for one in served}
         ends = {o.end for o in factory.dropoffs}
-        order = sorted(token_free(net).order, key=self._turns.__getitem__)
+        order = sorted(net.token_free.order, key=self._turns.__getitem__)
         dates, left = dict[tuple[int, int], float](), list[float]()
         lasting, last = self._lasting, dict[str, float]()
         units = factory.period

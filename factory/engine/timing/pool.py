@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from factory.support.errors import Diagnostic, InputError
-from factory.theory.nets.marked import MarkedNet, least_tokens, marked
+from factory.theory.nets.marked import MarkedNet, least_tokens
 from factory.theory.nets.petri import PetriNet, Place
 from factory.theory.plant.factory import Factory
 
@@ -19,7 +19,7 @@ def part_pool(factory: Factory, wip: int | None = None) -> Mapping[str, int]:
     fire no oftener than that beyond dropoff_e. With `wip`, in the net extended by `with_wip`. One
     search for all parts of a unit of a period. Raises InputError (BadValue) where `wip` is below 1.
     """
-    net = marked(factory.net) if wip is None else with_wip(factory, wip)
+    net = MarkedNet.of(factory.net) if wip is None else with_wip(factory, wip)
     least_of = [least_tokens(net, dropoff.end) for dropoff in factory.dropoffs]
     pool = {part.label: least_of[part.turn][part.start] for part in factory.leaves}
     return MappingProxyType({label: n for label, n in pool.items() if n is not None})
@@ -42,5 +42,5 @@ def with_wip(factory: Factory, wip: int) -> MarkedNet:
         Place(f"wip:{o.label}", (ends[turn],), (o.start,), "wip", o.label, 0, o.position)
         for o, (_, turn) in zip(factory.leaves, before, strict=True)
     )
-    tokens = marked(factory.net).tokens + tuple(-periods for periods, _ in before)
+    tokens = MarkedNet.of(factory.net).tokens + tuple(-periods for periods, _ in before)
     return MarkedNet(PetriNet(net.transitions, net.places + extra), tokens)

@@ -81,7 +81,13 @@ class Solid:
     @staticmethod
     def colour_of(node: Assembly, number: int) -> tuple[float, ...]:
         """The colour of a part in the PAG, else one of a sequence in which neighbours differ."""
-        return colour(node, number)
+        rgba = node.parameter("rgba")
+        if isinstance(rgba, tuple):
+            return rgba
+        round_, index = divmod(number, len(PALETTE))
+        hue, saturation, value = PALETTE[index]
+        red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)
+        return (round(red, 3), round(green, 3), round(blue, 3), 1.0)
 
     @property
     def axis(self) -> Array:
@@ -200,7 +206,7 @@ def primitive(
         sound(turn @ np.diag(mass * diagonal) @ turn.T),
         place - reach,
         place + reach,
-        colour(node, number),
+        Solid.colour_of(node, number),
         None,
         corners @ turn.T + place,
         (piece @ turn.T + place,),
@@ -226,7 +232,7 @@ def from_mesh(
         sound(turn @ (properties.inertia * mass / properties.volume) @ turn.T),
         corners.min(axis=0),
         corners.max(axis=0),
-        colour(node, number),
+        Solid.colour_of(node, number),
         properties.mesh,
         corners,
         tuple(piece @ turn.T + place for piece in properties.mesh.pieces) or (corners,),
@@ -246,14 +252,3 @@ def _mass(node: Assembly, volume: float) -> float:
     if mass is None:
         mass = float(node.parameter("density", DENSITY)) * volume  # type: ignore[arg-type]
     return max(float(mass), LEAST_MASS)  # type: ignore[arg-type]
-
-
-def colour(node: Assembly, number: int) -> tuple[float, ...]:
-    """The colour in the PAG, else one of a sequence in which neighbours differ."""
-    rgba = node.parameter("rgba")
-    if isinstance(rgba, tuple):
-        return rgba
-    round_, index = divmod(number, len(PALETTE))
-    hue, saturation, value = PALETTE[index]
-    red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)
-    return (round(red, 3), round(green, 3), round(blue, 3), 1.0)

@@ -19,7 +19,7 @@ from factory.floor.mating.meetings import Meeting, Meetings, meetings
 from factory.floor.mating.overlaps import Overlaps
 from factory.floor.mating.paths import SIGNS
 from factory.support.errors import Position
-from factory.theory.compiler.expanding import Node, nodes_of
+from factory.theory.compiler.expanding import Node
 from factory.theory.plant.approaches import MARGIN, Approach, Clash, Kind, Overlap, Pair
 from factory.theory.plant.factory import Factory
 
@@ -57,7 +57,7 @@ def judged(factory: Factory, product: Product) -> Factory:
     to join: its robots have no lifts, so all inputs slide, or are blocked."""
     if all(o.approach is not None for o in factory.operations if len(o.inputs) > 1):
         return factory
-    approaches = matings(nodes_of(factory), product, lifts=False).approaches
+    approaches = matings(Node.of_factory(factory), product, lifts=False).approaches
     operations = tuple(
         replace(o, approach=o.approach or approaches.get(o.label)) for o in factory.operations
     )

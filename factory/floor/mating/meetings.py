@@ -85,7 +85,7 @@ class Meetings:
 
 
 def meetings(nodes: Mapping[str, Node], axes: Mapping[str, int] = MappingProxyType({})) -> Meetings:
-    """The meetings of a product, from its operations in postorder (as `expand` gives them).
+    """The meetings of a product, from its operations in postorder (as `Node.expand` gives them).
 
     The output robot heads along x, so its inputs come along y; what a robot of its own brings is
     made by a robot that heads across; what the carrier holds was made on its own way, and what a

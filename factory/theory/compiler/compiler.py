@@ -15,7 +15,7 @@ from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.theory.compiler.assigning import beside, gear_net
 from factory.theory.compiler.domains import check_prepared
-from factory.theory.compiler.expanding import Node, expand
+from factory.theory.compiler.expanding import Node
 from factory.theory.compiler.turning import check_turned
 from factory.theory.plant.approaches import Approach
 from factory.theory.plant.factory import NO_PARENT, Factory
@@ -42,8 +42,8 @@ def compile_pag(
     """The factory that makes the product `pag` with the forms and hand-overs of a plan, and a robot
     for each tour. The products of a mix are compiled apart: each makes a unit in a period.
 
-    `approaches`: how the inputs of operations (by label, see `expand`) can come together; where one
-    is to be lowered, a lift brings it.
+    `approaches`: how the inputs of operations (by label, see `Node.expand`) can come together;
+    where one is to be lowered, a lift brings it.
 
     Raises InputError with every TypeMismatch and NotPrepared found. Robots and operations are
     numbered as in the specification of the net: the output robot is r1; an operation numbers all
@@ -54,7 +54,7 @@ def compile_pag(
         return beside(
             pag, [compile_pag(x, templates, catalogue, approaches, plan) for x in products]
         )
-    made = _allocated(pag, expand(pag, templates, plan), templates, catalogue, approaches)
+    made = _allocated(pag, Node.expand(pag, templates, plan), templates, catalogue, approaches)
     return _composed(pag, *made, plan)
 
 

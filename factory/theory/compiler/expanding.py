@@ -50,39 +50,40 @@ class Node:
         cls, pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN
     ) -> dict[str, Node]:
         """The operation instances of a product by label, each after its inputs, the product last;
-        joins have the forms of a plan, and what it hands over is relayed."""
-        return expand(pag, templates, plan)
+        joins have the forms of a plan, and what it hands over is relayed. Inputs beyond those of a
+        template are inserted one by one: `x = mate(a, b, c)` becomes `x/2 = mate(a, b)`,
+        `x = insert(x/2, c)`."""
+        nodes: dict[str, Node] = {}
+        for assembly in pag.postorder():
+            for label, template, inputs, last in _operations(assembly, templates, plan.forms):
+                if template.brought:
+                    inputs = tuple(_brought(nodes, template, inputs, templates))
+                size, dwell = 1 + sum([nodes[x].size for x in inputs]), _dwell(template, assembly)
+                nodes[label] = cls(label, template, inputs, dwell, size, assembly.position, last)
+        nodes = _in_postorder(nodes, pag.root) if plan.forms else nodes
+        return handed_over(nodes, plan.relays, templates)
 
     @classmethod
     def of_factory(cls, factory: Factory) -> dict[str, Node]:
         """The operation instances of a factory, for the first unit of a period."""
-        return nodes_of(factory)
+        nodes: dict[str, Node] = {}
+        for number in sorted(range(len(factory.making)), key=factory.postorder.__getitem__):
+            o = factory.operations[number]
+            if o.turn == 0:
+                size = 1 + sum(nodes[x].size for x in o.inputs)
+                nodes[o.label] = cls(o.label, o.template, o.taken, o.dwell, size, o.position)
+        return _in_postorder(nodes, factory.products[0])
 
     @staticmethod
     def relay_label(label: str, number: int) -> str:
         """Label after a hand-over, counted from 0."""
-        return relay_label(label, number)
+        return f"{label}/{RELAY}{number + 1}"
 
     @property
     def held(self) -> int:
         """The number of the input that the carrier holds before the operation, -1 for none."""
         held = self.template.held
         return -1 if held == NOPART else self.template.inputs.index(held)
-
-
-def expand(pag: PAG, templates: Mapping[str, Template], plan: Plan = AS_WRITTEN) -> dict[str, Node]:
-    """The operation instances by label, each after its inputs, the product last. Inputs beyond
-    those of a template are inserted one by one: `x = mate(a, b, c)` becomes `x/2 = mate(a, b)`,
-    `x = insert(x/2, c)`."""
-    nodes: dict[str, Node] = {}
-    for assembly in pag.postorder():
-        for label, template, inputs, last in _operations(assembly, templates, plan.forms):
-            if template.brought:
-                inputs = tuple(_brought(nodes, template, inputs, templates))
-            size, dwell = 1 + sum([nodes[x].size for x in inputs]), _dwell(template, assembly)
-            nodes[label] = Node(label, template, inputs, dwell, size, assembly.position, last)
-    nodes = _in_postorder(nodes, pag.root) if plan.forms else nodes
-    return handed_over(nodes, plan.relays, templates)
 
 
 def _brought(
@@ -115,7 +116,7 @@ def handed_over(
         made[label] = replace(node, inputs=inputs, size=size)
         come[label] = label
         for number in range(numbers.get(label, 0)):
-            name, before, size = relay_label(label, number), (come[label],), size + 1
+            name, before, size = Node.relay_label(label, number), (come[label],), size + 1
             relay = templates[RELAY]
             dwell = _dwell(relay, Assembly(name, RELAY, before))
             made[name] = Node(name, relay, before, dwell, size, node.position)
@@ -123,26 +124,10 @@ def handed_over(
     return made
 
 
-def relay_label(label: str, number: int) -> str:
-    """Label after a hand-over, counted from 0."""
-    return f"{label}/{RELAY}{number + 1}"
-
-
 def delivered(label: str, plan: Plan) -> str:
     """Label with which the next operation takes it, after all its hand-overs."""
     number = plan.relays.get(label, 0)
-    return relay_label(label, number - 1) if number else label
-
-
-def nodes_of(factory: Factory) -> dict[str, Node]:
-    """The expanded operations of a factory, for the first unit of a period."""
-    nodes: dict[str, Node] = {}
-    for number in sorted(range(len(factory.making)), key=factory.postorder.__getitem__):
-        o = factory.operations[number]
-        if o.turn == 0:
-            size = 1 + sum(nodes[x].size for x in o.inputs)
-            nodes[o.label] = Node(o.label, o.template, o.taken, o.dwell, size, o.position)
-    return _in_postorder(nodes, factory.products[0])
+    return Node.relay_label(label, number - 1) if number else label
 
 
 def _in_postorder(nodes: Mapping[str, Node], root: str) -> dict[str, Node]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from factory.theory.compiler.compiler import compile_nodes
-from factory.theory.compiler.expanding import delivered, handed_over, nodes_of
+from factory.theory.compiler.expanding import Node, delivered, handed_over
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.robot_types import Catalogue
 from factory.theory.problem.template import Template
@@ -20,7 +20,7 @@ def with_relays(
 ) -> Factory:
     """The factory with a given number of additional robots on the way of each label. Linear."""
     plan = replace(before.plan, relays={label: n for label, n in numbers.items() if n})
-    nodes = handed_over(nodes_of(before), plan.relays, templates)
+    nodes = handed_over(Node.of_factory(before), plan.relays, templates)
     approaches = {  # a relay turns nothing
         o.label: replace(o.approach, lowered=delivered(o.approach.lowered, plan))
         for o in before.operations

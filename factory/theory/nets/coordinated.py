@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import NONE, MarkedNet, marked, stuck_circuit, token_free
+from factory.theory.nets.marked import NONE, MarkedNet
 from factory.theory.nets.petri import PetriNet, Place, Transition
 from factory.theory.problem.ids import AxisId, PlaceId, RobotId, TransitionId, carriage_axis, is_end
 
@@ -88,8 +88,8 @@ class CoordinatedNet:
     @property
     def deadlock(self) -> tuple[PlaceId, ...]:
         """The places of a circuit without token, () where the net is live. Linear."""
-        stuck = token_free(self.net).stuck
-        return tuple(map(PlaceId, stuck_circuit(self.net, stuck) if stuck else ()))
+        stuck = self.net.token_free.stuck
+        return tuple(map(PlaceId, self.net.stuck_circuit(stuck) if stuck else ()))
 
     def as_json(self) -> dict[str, object]:
         """The net as `check --json` tells of it: its size, whether it is live, and the order places
@@ -108,7 +108,7 @@ class Coordination:
     """Builds a coordinated net upon a compiled one."""
 
     def __init__(self, net: GearNet) -> None:
-        compiled = marked(net)
+        compiled = MarkedNet.of(net)
         self.transitions, self.places = [*compiled.net.transitions], [*compiled.net.places]
         self.tokens, self._compiled = [*compiled.tokens], len(compiled.net.transitions)
         self.passes: dict[Past, tuple[PlaceId, Past | None]] = {}

@@ -21,7 +21,7 @@ import numpy as np
 
 from factory.support.arrays import Array, Index
 from factory.theory.nets.components import strong_components
-from factory.theory.nets.marked import NONE, MarkedNet, token_free
+from factory.theory.nets.marked import NONE, MarkedNet
 
 ROUNDING = 1e-12
 """Relative tolerance of dates."""
@@ -61,7 +61,7 @@ def max_cycle_ratio(net: MarkedNet, seconds: Sequence[float]) -> CycleRatio:
 
     Raises ValueError where the net is no marked graph, has no circuit or is not live.
     """
-    if not net.is_marked_graph or token_free(net).stuck:
+    if not net.is_marked_graph or net.token_free.stuck:
         raise ValueError("only a live marked graph has a cycle time")
     graph = _Graph(net, seconds)
     if not len(graph.places):

@@ -18,7 +18,7 @@ from itertools import groupby
 from operator import itemgetter
 from types import MappingProxyType
 
-from factory.theory.nets.marked import NONE, MarkedNet, token_free
+from factory.theory.nets.marked import NONE, MarkedNet
 from factory.theory.nets.petri import PetriNet, Place
 from factory.theory.problem.ids import TransitionId
 
@@ -168,7 +168,7 @@ class _Paths:
     def _reaches(self, ways: Iterable[Pair]) -> Iterator[tuple[_Reach, list[Pair]]]:
         """The transitions from which the ends of ways are reached, for BLOCK ends at a time, each
         time with the ways that end there."""
-        to_end, order = dict[int, list[Pair]](), token_free(self._net).order[::-1]
+        to_end, order = dict[int, list[Pair]](), self._net.token_free.order[::-1]
         for way in dict.fromkeys(ways):
             to_end.setdefault(way[1], []).append(way)
         ends = [*to_end]

@@ -70,16 +70,50 @@ class MarkedNet(Pictured):
     def of(cls, net: GearNet | MarkedNet) -> MarkedNet:
         """A net with its initial tokens. A place that `initial` names for each robot in its slots
         has one token; for each further time that it is named, one more."""
-        return marked(net)
+        if isinstance(net, MarkedNet):
+            return net
+        tokens = [0] * len(net.threaded.places)
+        for place, named in Counter(net.initial).items():
+            owners = max(1, len(net.slots[place]))
+            tokens[place] = max(1, named - owners + 1)
+        return cls(net.threaded.net, tuple(tokens), net.gears, net.slots)
 
     @cached_property
     def token_free(self) -> TokenFree:
-        """The topological order of a marked graph along its places without tokens."""
-        return token_free(self)
+        """The topological order of a marked graph along its places without tokens. Linear."""
+        waits = [0] * len(self.net.transitions)
+        free = [not tokens for tokens in self.tokens]
+        for event in self.blocked:
+            waits[event] = 1
+        for place, event in enumerate(self.right):
+            if free[place] and event != NONE:
+                waits[event] += 1
+        order = [TransitionId(event) for event, count in enumerate(waits) if not count]
+        right, postset = self.right, self.net.postset
+        for event in order:
+            for place in postset[event]:
+                after = right[place]
+                if free[place] and after != NONE:
+                    waits[after] -= 1
+                    if not waits[after]:
+                        order.append(after)
+        return TokenFree(tuple(order), tuple(e for e, count in enumerate(waits) if count))
 
     def stuck_circuit(self, stuck: Iterable[int]) -> tuple[int, ...]:
-        """The places of a circuit that never carries a token, where transitions are stuck."""
-        return stuck_circuit(self, stuck)
+        """The places of a circuit that never carries a token, where transitions are stuck: free of
+        tokens, or one place that its transition both needs and gives back, or alone one that has
+        neither token nor producer."""
+        import networkx as nx  # only a net that is stuck pays for it
+
+        never, waits = frozenset(stuck), nx.DiGraph()
+        for event in sorted(never):
+            for place in self.net.preset[event]:
+                before = self.left[place]
+                if before == event or (before == NONE and not self.tokens[place]):
+                    return (place,)
+                if before in never and not self.tokens[place]:
+                    waits.add_edge(before, event, place=place)
+        return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
 
     def notation(self, place: int) -> str:
         """A place as the paper writes it: [a, b; c]."""
@@ -152,17 +186,6 @@ class MarkedNet(Pictured):
         return covered
 
 
-def marked(net: GearNet | MarkedNet) -> MarkedNet:
-    """A net with its initial tokens (`MarkedNet.of`)."""
-    if isinstance(net, MarkedNet):
-        return net
-    tokens = [0] * len(net.threaded.places)
-    for place, named in Counter(net.initial).items():
-        owners = max(1, len(net.slots[place]))
-        tokens[place] = max(1, named - owners + 1)
-    return MarkedNet(net.threaded.net, tuple(tokens), net.gears, net.slots)
-
-
 def _only(events: tuple[TransitionId, ...]) -> TransitionId:
     if len(events) == 1:
         return events[0]
@@ -179,44 +202,6 @@ class TokenFree:
 
     order: tuple[int, ...]
     stuck: tuple[int, ...]
-
-
-def token_free(net: MarkedNet) -> TokenFree:
-    """The topological order of a marked graph along its places without tokens. Linear."""
-    waits = [0] * len(net.net.transitions)
-    free = [not tokens for tokens in net.tokens]
-    for event in net.blocked:
-        waits[event] = 1
-    for place, event in enumerate(net.right):
-        if free[place] and event != NONE:
-            waits[event] += 1
-    order = [TransitionId(event) for event, count in enumerate(waits) if not count]
-    right, postset = net.right, net.net.postset
-    for event in order:
-        for place in postset[event]:
-            after = right[place]
-            if free[place] and after != NONE:
-                waits[after] -= 1
-                if not waits[after]:
-                    order.append(after)
-    return TokenFree(tuple(order), tuple(e for e, count in enumerate(waits) if count))
-
-
-def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
-    """The places of a circuit that never carries a token, where transitions are stuck: free of
-    tokens, or one place that its transition both needs and gives back, or alone one that has
-    neither token nor producer."""
-    import networkx as nx  # only a net that is stuck pays for it
-
-    never, waits = frozenset(stuck), nx.DiGraph()
-    for event in sorted(never):
-        for place in net.net.preset[event]:
-            before = net.left[place]
-            if before == event or (before == NONE and not net.tokens[place]):
-                return (place,)
-            if before in never and not net.tokens[place]:
-                waits.add_edge(before, event, place=place)
-    return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
 
 
 def breadth_first(beside: Sequence[Sequence[int]], onward: Sequence[int]) -> dict[int, int]:

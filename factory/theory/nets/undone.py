@@ -50,9 +50,22 @@ class Undone:
         return cls(*what, tuple(names[event] for event in asked), tuple(undone))
 
     @staticmethod
-    def lasting(entries: Iterable[str | Undone]) -> list[int]:
-        """Indices of the firings that are not undone."""
-        return lasting(entries)
+    def lasting(entries: Iterable[Entry]) -> list[int]:
+        """Indices of the firings that are not undone: an undo takes back the latest of its
+        transitions.
+
+        They too are a firing sequence of the net, to the same marking: counts with m_0 + C n >= 0
+        are closed under the lesser of two.
+        """
+        left: dict[str, list[int]] = {}
+        for number, entry in enumerate(entries):
+            if isinstance(entry, str):
+                left.setdefault(entry, []).append(number)
+                continue
+            for name in entry.transitions:
+                if left.get(name):  # others fired before the run began
+                    left[name].pop()
+        return sorted(chain.from_iterable(left.values()))
 
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
@@ -67,20 +80,3 @@ class Undone:
 
 Entry = str | Undone
 """A transition that fired, by its name, or what was undone."""
-
-
-def lasting(entries: Iterable[Entry]) -> list[int]:
-    """Indices of the firings that are not undone: an undo takes back the latest of its transitions.
-
-    They too are a firing sequence of the net, to the same marking: counts with m_0 + C n >= 0 are
-    closed under the lesser of two.
-    """
-    left: dict[str, list[int]] = {}
-    for number, entry in enumerate(entries):
-        if isinstance(entry, str):
-            left.setdefault(entry, []).append(number)
-            continue
-        for name in entry.transitions:
-            if left.get(name):  # others fired before the run began
-                left[name].pop()
-    return sorted(chain.from_iterable(left.values()))

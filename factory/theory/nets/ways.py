@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from factory.theory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import PetriNet, Place
 
 Way = tuple[int, int]
@@ -55,7 +55,7 @@ def train_ratio(
     delays = list(seconds)
     apart = ways_apart(gears, delays, ways)
     delays += apart.values()
-    ratio = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
+    ratio = max_cycle_ratio(with_ways(MarkedNet.of(gears), gears, apart), delays)
     owners: dict[int, tuple[int, ...]] = dict(enumerate(gears.slots))
     owners |= {len(seconds) + number: key[:1] for number, key in enumerate(apart)}
     return ratio, busiest(owners, ratio.circuit, delays)

@@ -20,7 +20,7 @@ from factory.apps.exports.certificate.listing import CLAIMS, digest
 from factory.apps.exports.certificate.writer import certificate
 from factory.apps.foreign_nets.behaviour import analyse
 from factory.theory.nets.gears import GearNet
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.petri import Place
 from factory.theory.plant.factory import Factory
 from tests.command_line import Done, Terminal
@@ -121,7 +121,7 @@ def test_what_is_not_claimed_needs_a_reason(claim: str) -> None:
 
 
 def test_a_marked_place_without_robots_is_not_legal() -> None:
-    subject = marked(factory_of(paper()).net)
+    subject = MarkedNet.of(factory_of(paper()).net)
     places = (*subject.net.places, Place("spare", (), (), size=0))
     net = replace(subject.net, places=places)
     document = certified(MarkedNet(net, (*subject.tokens, 1), subject.gears, (*subject.slots, ())))

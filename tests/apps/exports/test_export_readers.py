@@ -23,7 +23,7 @@ from factory.engine.simulation.modelling import physical_model
 from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.simulation import Simulation
 from factory.support.rotations import rotation
-from factory.theory.nets.marked import MarkedNet, marked
+from factory.theory.nets.marked import MarkedNet
 from tests.export_values import (
     LAMP,
     MESHES,
@@ -46,7 +46,7 @@ DOCUMENT = ROOT / "docs" / "exports.md"
 
 
 def paper_net() -> MarkedNet:
-    return marked(subject(PAPER).net)
+    return MarkedNet.of(subject(PAPER).net)
 
 
 def arcs_of(net: MarkedNet) -> list[list[str]]:

@@ -43,7 +43,7 @@ from factory.theory.compiler.assigning import shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.tees import on_stems
 from factory.theory.lang.template_reader import load_templates
-from factory.theory.nets.marked import marked
+from factory.theory.nets.marked import MarkedNet
 from factory.theory.nets.verify import verify
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import PAG
@@ -148,7 +148,7 @@ def check(seed: int, folder: Path) -> None:
         return
     factory = layout.factory
     assert verify(factory.net).holds
-    truth = explored(marked(factory.net), 500) if len(factory.operations) < 12 else None
+    truth = explored(MarkedNet.of(factory.net), 500) if len(factory.operations) < 12 else None
     assert truth is None or truth.behaviour == (True, True, True)
     when = {number: n for n, number in enumerate(factory.order)}
     for robot in factory.robots:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from factory.apps.recovery.undo import marking_after, tokens_after, undo
 from factory.engine.record.replay import ReplayVerdict, replay
-from factory.theory.nets.marked import MarkedNet, marked
-from factory.theory.nets.undone import Entry, Joins, Undone, lasting
+from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.undone import Entry, Joins, Undone
 from factory.theory.plant.factory import Factory
 from tests.fold_values import random_fold, three_robots
 from tests.net_values import fair_run, random_marked_net
@@ -61,7 +61,7 @@ def test_it_is_the_greatest(seed: int, rng: random.Random) -> None:
     factory = random_fold(seed, 3)
     size = 2 * len(factory.operations)
     fired = fired_by(factory, rng.randint(1, 14 if size > 6 else 20), rng)
-    net, made, asked = marked(factory.net), factory.joins, some_asked(fired, rng)
+    net, made, asked = MarkedNet.of(factory.net), factory.joins, some_asked(fired, rng)
     assert undo(net, fired, asked, made) == brute(net, fired, asked, made)
 
 
@@ -164,7 +164,7 @@ def test_a_run_with_failures_replays(seed: int, rng: random.Random) -> None:
     assert (found.refines, found.reason) == (True, "")
     assert found.events == len(story.entries)
     assert found.marking == marking_after(factory.net, story.fired)
-    left = replay(factory.net, [story.entries[at] for at in lasting(story.entries)])
+    left = replay(factory.net, [story.entries[at] for at in Undone.lasting(story.entries)])
     assert (left.refines, left.marking) == (True, found.marking)
 
 
@@ -213,5 +213,5 @@ def test_the_reasons() -> None:
 
 def test_the_latest_firings_are_undone() -> None:
     undone = Undone(0.0, "x", "", ("a",), ("a",))
-    assert lasting(["a", "b", "a", undone, "b"]) == [0, 1, 4]
-    assert lasting(["a", undone, undone, "a", "b"]) == [3, 4]
+    assert Undone.lasting(["a", "b", "a", undone, "b"]) == [0, 1, 4]
+    assert Undone.lasting(["a", undone, undone, "a", "b"]) == [3, 4]

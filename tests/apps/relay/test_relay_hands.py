@@ -20,7 +20,7 @@ from factory.pipeline import read
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.expanding import expand, nodes_of
+from factory.theory.compiler.expanding import Node
 from factory.theory.lang.template_reader import load_templates
 from factory.theory.plant.operation import Operation
 from factory.theory.problem.plan import Plan
@@ -107,7 +107,7 @@ def _across(layout: Layout, robot: int) -> tuple[float, tuple[float, float], tup
 def test_piles_and_the_product_are_handed_over() -> None:
     pag, templates = row_of_inserts(5).factory.pag, load_templates([templates_folder()])
     plan = Plan(relays={"x/3": 1, "x": 2})
-    nodes = expand(pag, templates, plan)
+    nodes = Node.expand(pag, templates, plan)
     assert {x: (node.template.name, node.inputs) for x, node in nodes.items() if node.inputs} == {
         "x/2": ("mate", ("p0", "p1")),
         "x/3": ("insert", ("x/2", "p2")),
@@ -119,7 +119,7 @@ def test_piles_and_the_product_are_handed_over() -> None:
     }
     made = compile_pag(pag, templates, load_catalogue(), plan=plan)
     assert made.products == ("x/relay2",)
-    assert nodes_of(made) == nodes
+    assert Node.of_factory(made) == nodes
 
 
 def test_where_nothing_is_gained_nothing_is_changed() -> None:
