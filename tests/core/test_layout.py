@@ -4,6 +4,7 @@ What a hand costs, where pads and tips may be, and what is in their way."""
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
@@ -17,6 +18,7 @@ from factory.engine.simulation.simulation import Simulation
 from factory.floor.geometry.common_places import Top, common_places
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Solid
+from factory.floor.layout import nearness
 from factory.floor.layout.certificate import ALWAYS, ARM_BODY, NAMES, Certificate, Region
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.crowding import Crowding
@@ -37,7 +39,7 @@ from factory.floor.layout.hands.places import Loads, places
 from factory.floor.layout.hands.surfaces import hit
 from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
-from factory.floor.layout.nearness import distances
+from factory.floor.layout.nearness import Near, distances, meeting, near
 from factory.floor.layout.outline import Choice, Guest, outlined
 from factory.floor.layout.presence import ACROSS
 from factory.floor.layout.shapes import symmetric_shapes
@@ -300,6 +302,27 @@ def test_layers_keep_apart_unless_one_bears_what_it_hands_over() -> None:
     pairs = [(one, other) for one, other in combinations(sides, 2) if one.is_apart(other)]
     found = {(a.bears or b.bears, distances(a, b, 0.02)[2]) for a, b in pairs}
     assert found == {(False, ACROSS), (True, 0.0)}
+
+
+def test_boxes_are_compared_alike_in_blocks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout, apart = paper_layout(), 0.2
+    sides = list(presences(layout, coordinated(layout), {}))
+
+    def compared() -> tuple[list[Near], list[list[list[float]]]]:
+        pairs = [(one, other) for one, other in combinations(sides, 2) if one.is_apart(other)]
+        met = [meeting(one, other, (apart, apart, apart)) for one, other in pairs]
+        return [*near(sides, apart)], [[rows.tolist() for rows in each] for each in met]
+
+    at_once = compared()
+    assert at_once[0] and any(len(need) > 9 for need, *_ in at_once[1])
+    monkeypatch.setattr(nearness, "BLOCK", 3)
+    in_blocks = compared()
+    assert in_blocks[1] == at_once[1]
+    assert Counter(map(_close, in_blocks[0])) == Counter(map(_close, at_once[0]))
+
+
+def _close(pair: Near) -> tuple[object, ...]:
+    return pair.one.name(0), pair.other.name(0), pair.bodies, pair.lacking
 
 
 def test_a_pin_and_a_wait_cost_and_a_wait_no_more_than_a_long_one() -> None:
