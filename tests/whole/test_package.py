@@ -136,7 +136,7 @@ def test_a_build_is_that_of_the_command(run: Terminal, tmp_path: Path) -> None:
 
 def test_a_plan_is_a_product_and_what_interlocks_is_refused(tmp_path: Path) -> None:
     source(tmp_path, PEG)
-    made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=1)
+    made = factory.plan(tmp_path / "puzzle.pag", tmp_path / "out", replan=True, seconds=60)
     assert made.pag == factory.load_pag(made.files[0]) and made.planned.optimal
     assert {part.label for part in made.pag.parts()} == {*PEG}
     source(tmp_path, pinwheel())

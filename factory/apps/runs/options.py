@@ -175,9 +175,8 @@ def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
             raise usage_error(f"the ideal world has no bodies {purpose}", "leave out --world ideal")
 
 
-FUSE_FROM = 40
+FUSE_FROM = 12
 """From so many robots on, runs are fused unless told otherwise."""
-
 
 GEOMS = 100
 """But not where sub-assemblies would have more convex bodies than this for each part: each has
