@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.floor.layout import clearance
+from factory.floor.layout import clearance, kept_layouts
 from factory.floor.layout.request import Ground
 from factory.floor.mating import mating
 from factory.support.files import write_bytes
@@ -107,7 +107,8 @@ class Stages:
 
 @contextmanager
 def stages_once(folder: Path) -> Iterator[Stages]:
-    """The stages of the package, computed once in this block."""
+    """The stages of the package, computed once in this block, in place of what the user's cache
+    keeps of them, which knows no planted faults."""
     stages, lay_out, matings = Stages(folder), Ground.lay_out, mating.matings
     apart = stages.once(clearance.exclusions)
 
@@ -130,6 +131,7 @@ def stages_once(folder: Path) -> Iterator[Stages]:
     judged = stages.once(matings)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Ground, "lay_out", of_ground)
+        patch.setattr(kept_layouts, "kept_or", lambda find, *_: find())
         patch.setattr(mating, "matings", of_nodes)
         patch.setattr(clearance, "exclusions", lambda at: apart(replace(at, certificate=None)))
         patch.setattr(layout_values, "lay_out", stages.once(layout_values.lay_out))

@@ -14,6 +14,7 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -57,6 +58,26 @@ def digest(*parts: object) -> str:
         total.update(f" {shape} {len(content)} ".encode())
         total.update(content)
     return total.hexdigest()
+
+
+def content(value: Any, seen: dict[int, object] | None = None) -> object:
+    """What `digest` tells a value by, whatever holds it: a digest of a dataclass by the fields that
+    are compared, of a mapping, a tuple or a set by what is in it; else the value itself. `seen`:
+    the contents of dataclasses that the value shares with others, by their identities."""
+    seen = {} if seen is None else seen
+    if is_dataclass(value):
+        if id(value) not in seen:
+            values = (getattr(value, field.name) for field in fields(value) if field.compare)
+            parts = [content(one, seen) for one in values]
+            seen[id(value)] = digest(type(value).__qualname__, *parts)
+        return seen[id(value)]
+    if isinstance(value, Mapping):
+        return digest("mapping", *(content(one, seen) for both in value.items() for one in both))
+    if isinstance(value, tuple | list):
+        return digest("tuple", *(content(one, seen) for one in value))
+    if isinstance(value, set | frozenset):
+        return digest("set", *sorted(map(digest, (content(one, seen) for one in value))))
+    return value
 
 
 @cache

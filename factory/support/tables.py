@@ -81,6 +81,7 @@ def value_of(kind: type[T], table: Any, place: str = "") -> T:
 
 
 def _value(kind: Any, table: Any, place: str) -> Any:
+    kind = getattr(kind, "__supertype__", kind)
     origin, kinds = get_origin(kind), get_args(kind)
     if is_dataclass(kind):
         return _record(kind, table, place)

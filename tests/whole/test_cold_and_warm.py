@@ -22,10 +22,15 @@ from rich.cells import cell_len
 from factory.apps.drawing import markup
 from factory.commands import places
 from factory.floor.geometry import meshes
+from factory.floor.layout import embedding, kept_layouts
+from factory.floor.layout.kept_layouts import MANY, kept_or
+from factory.floor.layout.saved import LayoutTable
 from factory.floor.mating.finder import Finder
+from factory.pipeline import read as read_project
 from factory.support import console as console_module
 from factory.support.cache import load, store
 from factory.support.files import user_cache
+from factory.support.tables import table_of
 from factory.theory.lang import pag_syntax
 from factory.theory.lang.recovery import open_grammar
 from tests.command_line import Terminal
@@ -60,9 +65,9 @@ def file(tmp_path: Path) -> Path:
     return written(tmp_path)
 
 
-def written(folder: Path, more: str = "") -> Path:
+def written(folder: Path, more: str = "", text: str = TWO) -> Path:
     path = folder / "two.pag"
-    path.write_text(TWO.replace("{more}", more))
+    path.write_text(text.replace("{more}", more))
     return path
 
 
@@ -182,6 +187,40 @@ def test_boxes_are_checked_without_libraries_of_meshes(tmp_path: Path, cache: Pa
     assert "numpy" in found and not found & set(ENGINES)
     kept = [folder.name for folder in cache.iterdir()]
     assert kept == ["grammars"]  # what is computed at once is not kept
+
+
+def test_a_layout_is_searched_once(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is read back is what was found, to the last bit; what is damaged is found again."""
+
+    def laid(path: Path) -> tuple[object, ...]:
+        project = read_project(path)
+        layout = project.layout
+        return (
+            table_of(LayoutTable.of(layout)),
+            layout.certificate,
+            layout.floor,
+            project.hands.travels,
+        )
+
+    labels = [f"p{n}" for n in range(MANY)]
+    parts = "".join(f"{label} = atomic ( mass = 1 );\n" for label in labels)
+    text = f"root = s; s = mate ( {', '.join(labels)} );\n{parts}"
+    file = written(tmp_path, text=text)
+    monkeypatch.setattr(kept_layouts, "kept_or", kept_or)
+    found, searched = laid(file), embedding.drafted
+    monkeypatch.setattr(embedding, "drafted", None)
+    assert laid(file) == found
+    with pytest.raises(TypeError):
+        laid(written(tmp_path, text=text.replace("mass = 1", "mass = 2", 1)))
+    written(tmp_path, text=text)
+    (entry,) = (cache / "layouts").iterdir()
+    entry.write_bytes(entry.read_bytes()[:-1] + b" ")
+    with pytest.raises(TypeError):
+        laid(file)
+    monkeypatch.setattr(embedding, "drafted", searched)
+    assert laid(file) == found
 
 
 def printed_table(*table: Any) -> str:

@@ -80,7 +80,7 @@ def test_the_net_keeps_who_brings_and_who_takes_away_apart(cell: Layout) -> None
     MJCF, ways and circuits finds nothing, and finds the pair where its circuits are left out."""
     copies = {leaf.label: 1 for leaf in cell.factory.leaves}
     settings = Settings(timestep=0.002)
-    model = stock.written(build_model(cell, load_catalogue(), copies, settings))
+    model = build_model(cell, load_catalogue(), copies, settings, finish=stock.write)
     assert cell.certificate is not None
     m, machines, clearance = load(model), ways(model), cell.certificate.as_json()
     assert check(m, machines, clearance) == []

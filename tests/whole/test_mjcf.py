@@ -16,7 +16,7 @@ import trimesh
 
 import factory
 from factory.apps.exports.binary import beside
-from factory.apps.exports.stock import model_files, written
+from factory.apps.exports.stock import model_files
 from factory.apps.fidelity.record import QUANTITIES
 from factory.engine.mjcf.driving import ALLOWED
 from factory.engine.mjcf.loading import load
@@ -31,6 +31,7 @@ from tests.command_line import Terminal
 from tests.examples import without_hands
 from tests.paths import PAPER, ROOT, files_in
 from tests.plug_in import write_package
+from tests.stock_models import written
 
 SHAPES = """root = s; s = mate(box, cylinder, ball, wedge, flat, plain, shell, heavy);
 box = atomic ( box = (0.06, 0.04, 0.02), quat = (1, 2, 3, 4), density = 700 );

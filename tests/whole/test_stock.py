@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from benches.fidelity.products import layout
-from factory.apps.exports.stock import model_files, written
+from factory.apps.exports.stock import model_files
 from factory.engine.mjcf.loading import load
 from factory.engine.mjcf.model import Model
 from factory.engine.mjcf.timestep import timed
@@ -25,6 +25,7 @@ from factory.support.files import write_all
 from factory.support.settings import Settings
 from tests.oracles.driving import ahead, start
 from tests.paths import ROOT
+from tests.stock_models import written
 
 PAGE = ROOT / "docs" / "guide" / "driving.md"
 BLOCKS = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)

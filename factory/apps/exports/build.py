@@ -26,7 +26,7 @@ from factory.apps.exports.floor_sheet import write_svg
 from factory.apps.exports.goals import goals
 from factory.apps.exports.pnml import write_pnml
 from factory.apps.exports.program_text import write_program
-from factory.apps.exports.stock import model_files, written
+from factory.apps.exports.stock import model_files, write
 from factory.apps.exports.subject import Subject
 from factory.apps.exports.ways import ways
 from factory.apps.log.plan_file import LAYOUT_NAME, PLAN_NAME, plan_files
@@ -136,7 +136,8 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     clearance = layout.certificate or LayoutMachines(layout).certify()
     if not clearance.holds:
         raise RunError(fault.diagnostic() for fault in clearance.faults)
-    model = written(physical_model(layout, request.units, settings, project.catalogue, request.wip))
+    of = layout, request.units, settings, project.catalogue, request.wip
+    model = physical_model(*of, finish=write)
     mjcf = request.model_path(project.name)
     path = beside(mjcf) if mjcf else None
     binary = _binary(model, path)

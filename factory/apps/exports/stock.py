@@ -13,9 +13,8 @@ hold them there, are in the keyframe `home`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from factory.api import Layout, LayoutMachines, Model, names
@@ -27,10 +26,10 @@ LAW = ("kp", "kv", "forcerange")
 """What an actuator of a run and the written one have in common."""
 
 
-def written(model: Model) -> Model:
-    """The written form of a run's model. The force of its actuators is kp (ctrl - q) - kv v; so a
-    position x, a speed u and a force f, as a run sets them, are ctrl = x + (kv u + f) / kp."""
-    root = ElementTree.fromstring(model.xml)
+def write(model: Model, root: Element) -> None:
+    """Give the element of a run's model the written form. The force of its actuators is
+    kp (ctrl - q) - kv v; so a position x, a speed u and a force f, as a run sets them, are
+    ctrl = x + (kv u + f) / kp."""
     for option in root.findall("option"):
         for flag in option.findall("flag"):
             option.remove(flag)
@@ -55,14 +54,8 @@ def written(model: Model) -> Model:
     if rests := joints_at_rest(model.layout):
         from factory.api import load
 
-        qpos, ctrl = key_values(load(_with_root(model, root)), rests)
+        qpos, ctrl = key_values(load(model.with_tree(root)), rests)
         key.attrib.update(qpos=numbers(qpos.tolist()), ctrl=numbers(ctrl.tolist()))
-    ElementTree.indent(root)
-    return _with_root(model, root)
-
-
-def _with_root(model: Model, root: Element) -> Model:
-    return replace(model, xml=ElementTree.tostring(root, encoding="unicode") + "\n")
 
 
 @dataclass(frozen=True, slots=True)

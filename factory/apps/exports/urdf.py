@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.api import names, physical_model
-from factory.apps.exports.stock import written
+from factory.apps.exports.stock import write
 from factory.apps.exports.subject import Subject
 from factory.support.arrays import Array
 from factory.support.meshes.triangles import convex_hull, stl
@@ -38,7 +38,7 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
     from factory.api import load
 
     project = subject.project
-    model = written(physical_model(project.layout, 1, project.settings, project.catalogue))
+    model = physical_model(project.layout, 1, project.settings, project.catalogue, finish=write)
     folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
     speed = project.settings.speed
     speeds = {names.joint(axis): speed / axis.motion.lever for axis in project.factory.axes}

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from hashlib import sha256
 from typing import TypeAlias
-from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 from factory.engine.mjcf.arrays import Fingerprint, fingerprint_of
 from factory.engine.mjcf.model import Model
@@ -22,6 +21,13 @@ MANY = 20_000
 
 PIECE = 10_000
 """Elements of a piece."""
+
+BODY = re.compile(r"^    <body .*?^    </body>\n", re.M | re.S)
+"""A body of the world, with all that is in it, in a text whose levels are indented by two spaces,
+as `Model.with_tree` does."""
+
+SHARED = re.compile(r"^  <compiler .*?/>\n|^  <default>.*?^  </default>\n", re.M | re.S)
+"""What every piece has of it, too."""
 
 KEPT = 8
 """Number of models whose fingerprints are kept."""
@@ -73,37 +79,25 @@ def compiled(xml: str, meshes: Mapping[str, bytes]) -> mujoco.MjModel:
 def _by_pieces(xml: str, files: Mapping[str, bytes]) -> mujoco.MjModel:
     """The same model to the last byte, read piece by piece. Each element that the engine's reader
     adds makes it list all that it has read, so that reading is quadratic in the size of a piece."""
-    root = ElementTree.fromstring(xml)
-    world, shared = root.find("worldbody"), [root.find("compiler"), root.find("default")]
-    assert world is not None
-    bodies = world.findall("body")
-    for body in bodies:
-        world.remove(body)
-    spec = mujoco.MjSpec.from_string(_text(root), assets=dict(files))
-    del root, world  # the engine's own copy takes their room
+    bodies, shared = BODY.findall(xml), "".join(SHARED.findall(xml))
+    spec = mujoco.MjSpec.from_string(BODY.sub("", xml), assets=dict(files))
     with unwarned():  # that names could clash: here they are those of one model
         for some in _blocks(bodies):
-            piece = Element("mujoco")
-            piece.extend(part for part in shared if part is not None)
-            ElementTree.SubElement(piece, "worldbody").extend(some)
-            child = mujoco.MjSpec.from_string(_text(piece))
+            piece = f"<mujoco>{shared}<worldbody>{some}</worldbody></mujoco>"
+            child = mujoco.MjSpec.from_string(piece)
             spec.attach(child, prefix="", frame=spec.worldbody.add_frame())
         return spec.compile()
 
 
-def _blocks(bodies: list[Element]) -> Iterator[list[Element]]:
+def _blocks(bodies: list[str]) -> Iterator[str]:
     """Bodies with PIECE elements, or a body more, at a time; they are taken out of the list."""
     bodies.reverse()
     while bodies:
-        some, size = list[Element](), 0
+        some, size = list[str](), 0
         while bodies and size <= PIECE:
             some.append(bodies.pop())
-            size += sum(1 for _ in some[-1].iter())
-        yield some
-
-
-def _text(root: Element) -> str:
-    return ElementTree.tostring(root, encoding="unicode")
+            size += some[-1].count("<") - some[-1].count("</")
+        yield "".join(some)
 
 
 def _explained(model: Model, words: str) -> Diagnostic:

@@ -8,13 +8,13 @@ same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from pathlib import Path
 from types import MappingProxyType
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -121,6 +121,11 @@ class Model:
         bodies = sum(1 for _ in root.iter("body")) + 1
         return ARENA + 2 * 4 * bodies * (bodies - 1) // 2 // 2**20
 
+    def with_tree(self, root: Element) -> Model:
+        """The model with the text of an element, which is indented."""
+        ElementTree.indent(root)
+        return replace(self, xml=ElementTree.tostring(root, encoding="unicode") + "\n")
+
     @property
     def reservations(self) -> tuple[str, ...]:
         """What a run of it does not show, in words."""
@@ -150,6 +155,10 @@ class Model:
     def bodies(self) -> int:
         """How many bodies of parts and sub-assemblies there are."""
         return sum(self.copies.values())
+
+
+Finish: TypeAlias = Callable[[Model, Element], None]
+"""Changes the element of a model that has no text yet."""
 
 
 def part_copies(
@@ -190,11 +199,12 @@ def build_model(
     shown: bool = True,
     wip: int | None = None,
     bins: tuple[Bin, ...] = (),
+    finish: Finish | None = None,
 ) -> Model:
     """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
-    what is only there to be `shown`, if it is not; with `bins`, if parts may be scrapped. The
-    `copies` are enough for `wip` units inside at once. Raises InputError where the MJCF of a robot
-    type is unusable."""
+    what is only there to be `shown`, if it is not; with `bins`, if parts may be scrapped; with
+    what `finish` changes, if anything. The `copies` are enough for `wip` units inside at once.
+    Raises InputError where the MJCF of a robot type is unusable."""
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {
@@ -234,11 +244,12 @@ def build_model(
     if not shown:
         leave_out_what_is_shown(root)
     fill(section["size"], memory=f"{Model.memory_of(root)}M")
-    ElementTree.indent(root)
-    xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.axes) + 2 + len(sliders) + jaws + sum(copies.values())
-    made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
-    return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
+    made = Model(layout, settings, bodies, copies, masses, drives, insets, "", files)
+    made = replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
+    if finish is not None:
+        finish(made, root)
+    return made.with_tree(root)
 
 
 def _sliders(

@@ -19,7 +19,7 @@ from factory.support.settings import Settings
 from factory.theory.problem.robot_types import Catalogue
 
 if TYPE_CHECKING:
-    from factory.engine.mjcf.model import Model
+    from factory.engine.mjcf.model import Finish, Model
 
 SPARE = 2
 """So many copies more of each body are there where parts may be scrapped: they are back in their
@@ -68,6 +68,7 @@ def physical_model(
     under_way: Mapping[str, int] | None = None,
     fuse: bool = False,
     shown: bool = True,
+    finish: Finish | None = None,
 ) -> Model:
     """The MJCF model of a layout with the bodies that a number of units needs.
 
@@ -81,13 +82,14 @@ def physical_model(
         under_way: labels that are under way where the run begins, with their number.
         fuse: whether sub-assemblies are bodies, too; then few parts are enough.
         shown: whether it has what is only shown, too.
+        finish: what changes its element before it becomes text; None for nothing.
     """
     from factory.engine.mjcf.model import build_model
 
     bodies = bodies_of(layout.factory, layout.product, fuse)
     copies, wip = _copies(layout, bodies, units, wip, under_way or {})
     catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
-    return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
+    return build_model(layout, catalogue, copies, settings, bodies, shown, wip, (), finish)
 
 
 def _copies(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from numbers import Real
 from typing import TYPE_CHECKING
 
@@ -113,6 +114,7 @@ class Ground:
         no room."""
         from factory.floor.layout.durations import Pace
         from factory.floor.layout.embedding import lay_out
+        from factory.floor.layout.kept_layouts import kept_or
         from factory.floor.mating.mating import judged
 
         self.check(factory.folded)
@@ -120,7 +122,9 @@ class Ground:
         factory, product = judged(factory, product), product.repeated(factory)
         hands = hands or hands_of(factory, product, settings)
         floor = None if self.tile else self.floor
-        layout = lay_out(factory, product, settings.clearance, floor, pace, hands, draft)
+        asked = settings.clearance, floor, pace
+        find = partial(lay_out, factory, product, *asked, hands, draft)
+        layout = kept_or(find, factory, product, hands, *asked)
         for variant in self.variants:
             layout = layout_variant(variant)(layout, self, settings, hands)
         return layout

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.certificate import Certificate
 from factory.floor.layout.embedding import certified
 from factory.floor.layout.guidepath import Guidepath
 from factory.floor.layout.hands.hand import Hand, Point3
@@ -82,9 +83,16 @@ class LayoutTable:
             layout.tile,
         )
 
-    def laid_out(self, factory: Factory, product: Product, plain: Factory) -> Layout:
-        """The layout of a factory, which without relays is `plain`, and its product, certified
-        anew. Raises ValueError where the table is not of that factory, or things are not clear."""
+    def laid_out(
+        self,
+        factory: Factory,
+        product: Product,
+        plain: Factory,
+        certificate: Certificate | None = None,
+    ) -> Layout:
+        """The layout of a factory, which without relays is `plain`, and its product, with its
+        `certificate`, or certified anew. Raises ValueError where the table is not of that factory,
+        or things are not clear."""
         if self.frame is not None:
             low, high = map(np.array, self.frame)
             product = replace(product, low=low, high=high)
@@ -101,7 +109,7 @@ class LayoutTable:
             tile=self.tile,
         )
         try:
-            laid = certified(laid)
+            laid = certified(laid, certificate=certificate)
         except RunError as error:
             raise ValueError(f"it is not clear: {error.diagnostics[0].message}") from error
         if self.plain:

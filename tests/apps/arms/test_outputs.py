@@ -17,7 +17,7 @@ from factory.apps.arms.joint_table import legs_of
 from factory.apps.arms.legs import NoWay
 from factory.apps.exports import exporters
 from factory.apps.exports.chain_rest import joints_at_rest
-from factory.apps.exports.stock import written
+from factory.apps.exports.stock import write
 from factory.apps.exports.writing import export, exporter
 from factory.apps.live.page import stage_of
 from factory.apps.recovery import recover
@@ -75,7 +75,7 @@ def test_a_folder_gets_a_file_for_every_arm(small: Project, tmp_path: Path) -> N
 
 def test_the_written_model_stands_still_in_its_keyframe(small: Project) -> None:
     """Each arm is held where a run starts, against gravity, by the setpoints of the keyframe."""
-    model = written(physical_model(laid(small), 1, small.settings, small.catalogue))
+    model = physical_model(laid(small), 1, small.settings, small.catalogue, finish=write)
     m, rests = load(model), joints_at_rest(laid(small))
     d = mujoco.MjData(m)
     mujoco.mj_resetDataKeyframe(m, d, m.key("home").id)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from factory.apps.exports import exporters
-from factory.apps.exports.stock import written as stock
+from factory.apps.exports.stock import write
 from factory.apps.log import read_log
 from factory.apps.log.model import model_of
 from factory.apps.plc.driven import drive
@@ -440,7 +440,7 @@ def urdf_by_mujoco(folder: Path) -> None:
 
     for file in (MESHES, LAMP):
         path = written(made("urdf", file, "", "x.urdf"), folder / file.stem / "x.urdf")
-        one = load(stock(physical_model(project(file).layout, 1, project(file).settings)))
+        one = load(physical_model(project(file).layout, 1, project(file).settings, finish=write))
         other = mujoco.MjModel.from_xml_path(str(path))
         bodies = {one.body(n).name for n in range(one.nbody)} - {COMPASS}
         assert bodies == {other.body(n).name for n in range(other.nbody)}
@@ -484,7 +484,7 @@ def urdf_by_yourdfpy(folder: Path) -> None:
     import mujoco
 
     path = written(made("urdf", MESHES, "", "x.urdf"), folder / "x.urdf")
-    m = load(stock(physical_model(project(MESHES).layout, 1, project(MESHES).settings)))
+    m = load(physical_model(project(MESHES).layout, 1, project(MESHES).settings, finish=write))
     values, d = _random_joints(m), mujoco.MjData(m)
     for joint, value in values.items():
         d.joint(joint).qpos[0] = value

@@ -50,7 +50,8 @@ def laid_out(seed: int) -> Layout:
 def _written(seed: int) -> tuple[mujoco.MjModel, Json, Json]:
     layout = laid_out(seed)
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
-    model = stock.written(build_model(layout, load_catalogue(), copies, Settings(timestep=0.002)))
+    settings = Settings(timestep=0.002)
+    model = build_model(layout, load_catalogue(), copies, settings, finish=stock.write)
     assert layout.certificate is not None
     return load(model), ways(model), layout.certificate.as_json()
 

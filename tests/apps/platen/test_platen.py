@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import factory
-from factory.apps.exports.stock import written as stock
+from factory.apps.exports.stock import write
 from factory.apps.platen import compacting
 from factory.apps.platen.compacting import compacted
 from factory.apps.platen.placing import Floor, Placing
@@ -153,7 +153,7 @@ def test_a_urdf_has_both_slides_of_a_robot_on_a_bend(layout: Layout, tmp_path: P
     """MuJoCo reads it, and puts all bodies where they are in the written model."""
     file = tmp_path / "lamp.urdf"
     factory.export(layout, "urdf", file)
-    one = load(stock(physical_model(layout, 1, Settings())))
+    one = load(physical_model(layout, 1, Settings(), finish=write))
     other = mujoco.MjModel.from_xml_path(str(file))
     here, there = mujoco.MjData(one), mujoco.MjData(other)
     for name, value in (("r9/slide", 0.3), ("r9/slide_across", -0.07)):

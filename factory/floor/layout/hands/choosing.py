@@ -138,6 +138,11 @@ class Hands:
         self.travels: dict[int, float] = {}
         self._on = {tour: of for of in self.tours.of for tour in of}
 
+    @property
+    def chosen_by(self) -> tuple[object, ...]:
+        """Everything that choices depend on, but for the solids."""
+        return self.factory, self._wanted, self.travels, self.holding.push
+
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:
         """The hand of a robot that heads along u, to a carrier that heads along t; None for a tool.
         For several tours: in its place on the label of the first."""
