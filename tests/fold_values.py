@@ -19,7 +19,6 @@ from factory.pipeline import Project
 from factory.support.settings import Settings
 from factory.theory.compiler.assigning import gear_net, shared
 from factory.theory.compiler.compiler import compile_pag
-from factory.theory.compiler.folding import sides_of
 from factory.theory.lang.template_reader import all_templates
 from factory.theory.nets.gears import GearNet
 from factory.theory.nets.marked import MarkedNet
@@ -171,7 +170,7 @@ def with_sides(factory: Factory, rng: random.Random) -> Factory:
 def _shares(
     factory: Factory, group: list[int], kid: int, on: Sequence[int], known: Catalogue
 ) -> bool:
-    sides = (sides_of(factory, robot) for robot in (*group, kid))
+    sides = (factory.sides(robot) for robot in (*group, kid))
     return bool(set.intersection(*sides)) and all(
         not mismatch(factory, other, kid, on, known)
         and factory.last(other).index != factory.last(kid).index

@@ -16,7 +16,7 @@ from factory.apps.arms.cell import GAP, down, shown_height
 from factory.apps.arms.holds import facing_up, product_of, quaternion
 from factory.apps.arms.lines import Line, line_of
 from factory.apps.arms.rises import Rise
-from factory.floor.geometry.suction import GAP as SUCTION_GAP
+from factory.floor.geometry.suction import PadPlace
 from factory.support.arrays import Array
 from factory.support.rotations import about_vertical
 
@@ -151,7 +151,7 @@ class Handling:
     @cached_property
     def tip(self) -> dict[str, Array]:
         """Where an arm's tool is on each part, in the product's frame (3,) [m]."""
-        off = GAP - SUCTION_GAP
+        off = GAP - PadPlace.GAP
         return {
             label: np.asarray(b.hold.pad.at + off * b.hold.normal)
             for label, b in self.burdens.items()

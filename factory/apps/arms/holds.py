@@ -15,7 +15,7 @@ from factory.api import Hand, Solid
 from factory.apps.arms.body import PAD_RADIUS
 from factory.apps.arms.chain import cross
 from factory.apps.arms.dynamics import GRAVITY
-from factory.floor.geometry.suction import PadPlace, pad_place
+from factory.floor.geometry.suction import PadPlace
 from factory.support.arrays import Array
 from factory.support.engine import mujoco
 
@@ -145,7 +145,7 @@ def _pad_on(solid: Solid, others: Sequence[Solid]) -> tuple[PadPlace, bool]:
 def _largest_pad(solid: Solid, taken: tuple[Array, Array] | None = None) -> PadPlace:
     """The largest pad that a part is level under; one of the least share for none."""
     for share in SHARES:
-        place = pad_place(solid, (1.0, 0.0), taken, PAD_RADIUS, share)
+        place = PadPlace.on(solid, (1.0, 0.0), taken, PAD_RADIUS, share)
         if place.level:
             break
     return place

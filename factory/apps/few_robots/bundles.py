@@ -16,7 +16,6 @@ from math import inf
 from factory.api import NOPART, Factory, Operation, Pace
 from factory.apps.few_robots.folding import Line
 from factory.support.boxes import Box
-from factory.theory.compiler.folding import begun_by, kind_of, sides_of
 
 BETWEEN = 0.08
 """Distance between two sub-assemblies at the ends of a guidepath [m]."""
@@ -74,7 +73,7 @@ class SizeTiming:
         """The tour of each robot of a factory with a robot for each label, tools apart."""
         robots = range(len(self.factory.robots))
         kinds = [
-            ("output",) if robot in self.outputs else kind_of(self.factory, robot)
+            ("output",) if robot in self.outputs else self.factory.tour_kind(robot)
             for robot in robots
         ]
         chosen = (robot for robot in robots if kinds[robot][0] != "tool")
@@ -202,9 +201,9 @@ class _Tour:
         return cls(
             robot,
             kind,
-            frozenset({1}) if is_output else frozenset(sides_of(factory, robot)),
+            frozenset({1}) if is_output else frozenset(factory.sides(robot)),
             timing.past(robot, numbers),
-            tuple(kid for kid in begun_by(factory, robot) if kind_of(factory, kid)[0] != "tool"),
+            tuple(kid for kid in factory.begun_by(robot) if factory.tour_kind(kid)[0] != "tool"),
             tuple((n, inserted[n]) for n in (numbers[1:] if is_output else numbers[1:-1])),
             tuple((kid, factory.last(kid).index) for kid in kids),
         )

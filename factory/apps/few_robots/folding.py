@@ -1,4 +1,21 @@
-"""Folds"""
+"""Folds: robots of a factory that come to the same place from the same side become one robot, on
+one *line*. Tools of one kind that come to one line become one, too.
+
+In a factory as Compile makes it each robot has one *tour*, from empty hands to empty hands; in that
+of a mix the tours of a robot are of one kind, and are assigned together. The tours form a tree: a
+*kid* of a tour is one that delivers to it. A fold assigns tours to lines: the output robot's tour
+to a line of its own, kids of tours of one line to lines that deliver to it, the inputs of one
+operation to different lines. One robot serves a line.
+
+A fold has exactly one live choice of programs: each robot does its tours in the order in which the
+program of the robot that it delivers to asks for them. That order is live, for below a pile that
+is held only lines below are used, so the product can be made once, operation by operation, in
+postorder with the pile first; in any other two deliveries and two tours in the reverse order close
+a circuit without a token. `nets.train` proves the former of each net anew.
+
+Guarantees: the net is a gear train, live, safe and reversible. What is no fold is refused
+(BadLine).
+"""
 
 from __future__ import annotations
 
@@ -8,7 +25,6 @@ from itertools import pairwise
 from factory.api import NOPART, Catalogue, Diagnostic, Factory, InputError, Plan
 from factory.support.errors import Position, did_you_mean
 from factory.theory.compiler.assigning import with_crew
-from factory.theory.compiler.folding import begun_by, kind_of, sides_at, sides_of
 
 Line = tuple[int, ...]
 """The tours of a line, as the robots of the factory that is folded."""
@@ -54,10 +70,10 @@ def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
     on = line_of(len(factory.robots), lines)
     groups: dict[tuple[object, ...], list[int]] = {}
     for robot in factory.robots[1:]:
-        kind = kind_of(factory, robot.index)
+        kind = factory.tour_kind(robot.index)
         if kind[0] == "tool":
             last = factory.last(robot.index)
-            sides = [frozenset(sides_at(last, r)) for r in last.robots if r != last.carrier]
+            sides = [frozenset(last.sides(r)) for r in last.robots if r != last.carrier]
             key = on[last.carrier], kind, *sides
             groups.setdefault(key, []).append(robot.index)
     return [tuple(tools) for tools in groups.values() if len(tools) > 1]
@@ -117,10 +133,10 @@ def line_faults(
             position = factory.robots[other].position
             yield _fault(f"{names}: {message}", position=position)
     deliveries = [tour[-1] for robot in line for tour in factory.tours[robot]]
-    if not set.intersection(*(sides_of(factory, robot) for robot in line)):
+    if not set.intersection(*(factory.sides(robot) for robot in line)):
         message = f"{_named(factory, first)} and others cannot all come from one side"
         yield _fault(message, position=factory.robots[first].position)
-    begun = {frozenset(on[guest] for guest in begun_by(factory, robot)) for robot in line}
+    begun = {frozenset(on[guest] for guest in factory.begun_by(robot)) for robot in line}
     if len(begun) > 1:
         message = f"what {_named(factory, first)} and others begin with comes on different lines"
         yield _fault(message, position=factory.robots[first].position)
@@ -136,14 +152,14 @@ def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) ->
     on = line_of(len(factory.robots), lines)
     heads: dict[int, list[int]] = {}
     for robot in dict.fromkeys(line for line in on if line):
-        if kind_of(factory, robot)[0] != "tool":
+        if factory.tour_kind(robot)[0] != "tool":
             heads.setdefault(on[factory.last(robot).carrier], []).append(robot)
     for one, other in (pair for group in heads.values() for pair in pairwise(group)):
         tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
         if len({factory.last(robot).index for robot in tours}) < len(tours):
             continue
         message = mismatch(factory, one, other, on, catalogue)
-        if not message and not set.intersection(*(sides_of(factory, r) for r in tours)):
+        if not message and not set.intersection(*(factory.sides(r) for r in tours)):
             message = "they cannot come from one side"
         if message:
             both = f"{_named(factory, one)} and {_named(factory, other)}"
@@ -162,7 +178,7 @@ def mismatch(
         return "they deliver to different robots"
     if catalogue.meet(factory.robots[one].type, factory.robots[other].type) is None:
         return "no robot type fits both"
-    if kind_of(factory, one) != kind_of(factory, other):
+    if factory.tour_kind(one) != factory.tour_kind(other):
         return "they begin or end in different ways"
     return ""
 

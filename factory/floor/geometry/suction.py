@@ -8,6 +8,7 @@ than the pad's place.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,9 +16,6 @@ from factory.floor.geometry.pieces import BOX_FACES, is_box
 from factory.floor.geometry.solids import Solid
 from factory.support.arrays import Array
 from factory.support.rotations import rotation
-
-GAP = 1e-4
-"""The gap between a pad and the part [m]."""
 
 WIDEST = 0.008
 """Radius of the largest pad [m]."""
@@ -31,8 +29,8 @@ SHARE = 0.25
 PLACES = 9
 """The number of candidate places along each side of a part."""
 
-EVEN = GAP / 2
-"""The tolerance for equal heights [m]."""
+EVEN = 5e-5
+"""The tolerance for equal heights [m], half a gap."""
 
 HIGHEST = 128
 """Of the triangles over a place so many are looked at at a time, those that reach highest first."""
@@ -43,55 +41,76 @@ Corner = Array
 
 @dataclass(frozen=True, slots=True)
 class PadPlace:
-    """The middle of a pad's lower face (3,), in the frame of the product, its radius [m], and
-    whether the part is level under all of it."""
+    """Where a suction pad is on a part.
+
+    Attributes:
+        GAP: the gap between a pad and the part [m].
+        at: the middle of the pad's lower face (3,), in the frame of the product [m].
+        radius: its radius [m].
+        level: whether the part is level under all of it.
+    """
+
+    GAP: ClassVar[float] = 1e-4
 
     at: Array = field(repr=False)
     radius: float
     level: bool = False
 
+    @classmethod
+    def on(
+        cls,
+        solid: Solid,
+        heading: tuple[float, float],
+        taken: tuple[Corner, Corner] | None = None,
+        largest: float = WIDEST,
+        share: float = SHARE,
+        terrains: Terrains | None = None,
+    ) -> PadPlace:
+        """The place on a part that leaves with a heading, a horizontal direction along an axis.
 
-def pad_place(
-    solid: Solid,
-    heading: tuple[float, float],
-    taken: tuple[Corner, Corner] | None = None,
-    largest: float = WIDEST,
-    share: float = SHARE,
-    terrains: Terrains | None = None,
-) -> PadPlace:
-    """The place of a pad on a part that leaves with a heading, a horizontal direction along an
-    axis. The pad has the `largest` radius [m], but at most that `share` of the part's least extent
-    in plan, stays out of the rectangle that is `taken`, and is smaller if necessary. Among equal
-    places the one nearest to the centre of mass is chosen; places with material under the middle
-    are preferred. `terrains`: those of the part, where they are known."""
-    low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
-    widest = max(min(largest, share * float((high - low).min())), NARROWEST)
-    faces, drawn = terrains or terrains_of(solid)
-    for radius in (widest, widest / 2, widest / 4):
-        places = _grid(solid, radius)
-        centre = places[0]
-        if taken is not None:
-            out = (places + radius <= taken[0]) | (places - radius >= taken[1])
-            places = places[out.any(axis=1)]
-        if len(places):
-            break
-    best, worst = None, (np.inf, np.inf)
-    for place in places:
-        under = place - radius, place + radius
-        top = min(faces.height_in(*under), float(solid.high[2]))  # of a ball what is round it
-        way = np.minimum(under[0], np.where(ahead > 0, low, under[0]))
-        end = np.maximum(under[1], np.where(ahead < 0, high, under[1]))
-        if faces.height_in(way, end) > top + EVEN or not np.isfinite(top):
-            continue
-        empty = top - drawn.height_in(place - radius / 4, place + radius / 4)
-        off = top - drawn.height_in(*under), min(empty, radius) if empty > EVEN else 0.0
-        if off[0] < EVEN and not off[1]:
-            return _at(place, top, radius, level=True)
-        if off < worst:
-            best, worst = _at(place, top, radius), off
-    if best is None:  # of a part that is nowhere level the highest place
-        return _at(places[0] if len(places) else centre, float(solid.high[2]), radius)
-    return best
+        Args:
+            solid: the part.
+            heading: where it leaves to.
+            taken: opposite corners of a rectangle in plan that the pad stays out of.
+            largest: the pad's radius [m], if there is room.
+            share: the largest radius as a share of the part's least extent in plan.
+            terrains: those of the part, where they are known.
+
+        Among equal places the one nearest to the centre of mass is chosen; places with material
+        under the middle are preferred.
+        """
+        low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
+        widest = max(min(largest, share * float((high - low).min())), NARROWEST)
+        faces, drawn = terrains or terrains_of(solid)
+        for radius in (widest, widest / 2, widest / 4):
+            places = _grid(solid, radius)
+            centre = places[0]
+            if taken is not None:
+                out = (places + radius <= taken[0]) | (places - radius >= taken[1])
+                places = places[out.any(axis=1)]
+            if len(places):
+                break
+        best, worst = None, (np.inf, np.inf)
+        for place in places:
+            under = place - radius, place + radius
+            top = min(faces.height_in(*under), float(solid.high[2]))  # of a ball what is round it
+            way = np.minimum(under[0], np.where(ahead > 0, low, under[0]))
+            end = np.maximum(under[1], np.where(ahead < 0, high, under[1]))
+            if faces.height_in(way, end) > top + EVEN or not np.isfinite(top):
+                continue
+            empty = top - drawn.height_in(place - radius / 4, place + radius / 4)
+            off = top - drawn.height_in(*under), min(empty, radius) if empty > EVEN else 0.0
+            if off[0] < EVEN and not off[1]:
+                return cls._at(place, top, radius, level=True)
+            if off < worst:
+                best, worst = cls._at(place, top, radius), off
+        if best is None:  # of a part that is nowhere level the highest place
+            return cls._at(places[0] if len(places) else centre, float(solid.high[2]), radius)
+        return best
+
+    @classmethod
+    def _at(cls, place: Corner, top: float, radius: float, level: bool = False) -> PadPlace:
+        return cls(np.array([*place, top + cls.GAP]), radius, level)
 
 
 def _grid(solid: Solid, radius: float) -> Array:
@@ -105,10 +124,6 @@ def _grid(solid: Solid, radius: float) -> Array:
     places = np.concatenate([[centre], (low + high) / 2 + grid * room])
     order = np.argsort(np.linalg.norm(places - solid.centre[:2], axis=1), kind="stable")
     return np.asarray(places[order])
-
-
-def _at(place: Corner, top: float, radius: float, level: bool = False) -> PadPlace:
-    return PadPlace(np.array([*place, top + GAP]), radius, level)
 
 
 @dataclass(frozen=True, slots=True)

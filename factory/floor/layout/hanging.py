@@ -11,13 +11,11 @@ import numpy as np
 from factory.floor.geometry.common_places import Top, common_places
 from factory.floor.geometry.solids import Product, Solid
 from factory.floor.geometry.suction import (
-    GAP,
     NARROWEST,
     SHARE,
     WIDEST,
     PadPlace,
     Terrains,
-    pad_place,
     terrains_of,
 )
 from factory.floor.layout.dimensions import PAD, PAYLOAD
@@ -100,7 +98,7 @@ class _FeederPads:
             if outlet.label not in self._terrains:
                 self._terrains[outlet.label] = terrains_of(solid)
             terrains = self._terrains[outlet.label]
-            place = pad_place(solid, heading, (low, high), terrains=terrains)
+            place = PadPlace.on(solid, heading, (low, high), terrains=terrains)
             self._found[key] = PadPlace(place.at - solid.position, place.radius)
         pad = self._found[key]
         return _seen(outlet, pad.at + solid.position, pad.radius)
@@ -110,7 +108,7 @@ class _FeederPads:
         middle of the pad's lower face."""
         solid = _solid(outlet)
         wide = float((solid.high - solid.low)[:2].min())
-        at = np.array([*solid.centre[:2], solid.low[2] - GAP - PAD])
+        at = np.array([*solid.centre[:2], solid.low[2] - PadPlace.GAP - PAD])
         return _seen(outlet, at, max(min(WIDEST, SHARE * wide), NARROWEST))
 
     def common(self, line: Sequence[Outlet]) -> dict[str, tuple[str, PadPlace]]:
@@ -126,7 +124,7 @@ class _FeederPads:
         for place in common_places(tops, (low, high)):
             named = place.parts[0]
             at = place.at + meeting[0] - meeting[named]
-            above = _solid(line[named]).high[2] + GAP
+            above = _solid(line[named]).high[2] + PadPlace.GAP
             pad = _seen(line[0], np.array([*at, above]), place.radius)
             pads.update({line[number].label: (line[named].label, pad) for number in place.parts})
         return pads

@@ -17,7 +17,6 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from itertools import permutations
 
 from factory.support.errors import Diagnostic, InputError
-from factory.theory.compiler.folding import begun_by, kind_of, sides_of
 from factory.theory.plant.factory import Factory
 from factory.theory.problem.pag import NOPART, Mix
 from factory.theory.problem.plan import Plan, Turns
@@ -152,13 +151,13 @@ class _Begins:
             return -1, "product", None
         onto, slot = on[last.carrier], last.robots.index(robot)
         if last.before[slot] == NOPART:
-            return onto, "tool", kind_of(self.forest, robot)
+            return onto, "tool", self.forest.tour_kind(robot)
         guests = [
             s for s, x in enumerate(last.before) if x != NOPART and last.robots[s] != last.carrier
         ]
         label = self._written(last.index, slot)
         if last.pile != NOPART or len(guests) != 2:
-            return onto, label, kind_of(self.forest, robot)
+            return onto, label, self.forest.tour_kind(robot)
         one, other = self.sides.setdefault(onto, ({}, {}))
         by = {self._written(last.index, s): last.robots[s] for s in guests}
 
@@ -188,8 +187,8 @@ def _fits(forest: Factory, tours: Sequence[int], catalogue: Catalogue) -> bool:
 
 def _alike(forest: Factory, tours: Sequence[int]) -> bool:
     """Whether tours are of one kind, and can all come from one side."""
-    kinds = {kind_of(forest, robot) for robot in tours}
-    sides = set.intersection(*(sides_of(forest, robot) for robot in tours))
+    kinds = {forest.tour_kind(robot) for robot in tours}
+    sides = set.intersection(*(forest.sides(robot) for robot in tours))
     return len(kinds) == 1 and bool(sides)
 
 
@@ -198,7 +197,7 @@ def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[tuple[int, 
     that."""
     begun: dict[int, tuple[int, frozenset[int]]] = {}
     for robot, line in enumerate(on):
-        lines = frozenset(on[guest] for guest in begun_by(forest, robot))
+        lines = frozenset(on[guest] for guest in forest.begun_by(robot))
         first, others = begun.setdefault(line, (robot, lines))
         if others != lines:
             yield robot, first
@@ -207,7 +206,7 @@ def _begun_otherwise(forest: Factory, on: Sequence[int]) -> Iterator[tuple[int, 
 def _fault(forest: Factory, here: int, there: int, apart: Mapping[int, int]) -> Diagnostic:
     """Why one robot cannot begin two tours (of robots of the forest), or what begins them, where
     that had to be kept `apart`."""
-    while (guest := next((r for r in begun_by(forest, here) if r in apart), None)) is not None:
+    while (guest := next((r for r in forest.begun_by(here) if r in apart), None)) is not None:
         here, there = guest, apart[guest]
     first, other = (forest.first(r) for r in (here, there))
     message = (

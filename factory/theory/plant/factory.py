@@ -18,12 +18,7 @@ from factory.theory.nets.undone import Joins
 from factory.theory.plant.axes import Axis
 from factory.theory.plant.operation import Operation
 from factory.theory.plant.robot import Robot
-from factory.theory.problem.ids import (
-    AxisId,
-    OperationId,
-    RobotId,
-    operation_of,
-)
+from factory.theory.problem.ids import AxisId, OperationId, RobotId, operation_of
 from factory.theory.problem.pag import NOPART, PAG
 from factory.theory.problem.plan import Plan, out_of_turn
 from factory.theory.problem.robot_bodies import LIFT_JOINT
@@ -266,6 +261,25 @@ class Factory(Pictured):
         """The last operation of a robot's program: what it brings is delivered there."""
         return self.operations[self.robots[robot].operations[-1]]
 
+    def begun_by(self, robot: int) -> list[RobotId]:
+        """The robots (index) that bring what a robot's tour begins with; none at a feeder."""
+        first = self.first(robot)
+        return [other for other in first.robots if other != robot] * (first.carrier == robot)
+
+    def sides(self, robot: int) -> set[int]:
+        """Sides of the approach axis from which a robot (index) may come to where it delivers."""
+        ends = (self.operations[tour[-1]] for tour in self.tours[robot])
+        return set.intersection(*(o.sides(robot) for o in ends))
+
+    def tour_kind(self, robot: int) -> tuple[object, ...]:
+        """Kind of a robot's (index) tours, alike for all that one robot can do: whether they begin
+        at a feeder (`fed`) or take what two robots bring, and how they deliver it."""
+        first, end = self.first(robot), self.last(robot).delivery(robot)
+        if end[0] == "tool":
+            return end
+        fed, joins = len(first.robots) == 1, len(first.inputs) > 1
+        return ("fed" if fed else "taking", *end) if fed or joins else ("alone", robot)
+
     def after(self, robot: int, operation: int) -> OperationId:
         """The operation (index) that comes after one in a robot's gear."""
         gear = self.robots[robot].operations
@@ -314,12 +328,8 @@ class Factory(Pictured):
     def takes_wholes(self) -> bool:
         """Whether a robot that moves several joints takes sub-assemblies: it may hold a part
         otherwise within one than when it brought that part to it, so each is one body."""
-        return any(
-            self.operations[tour[0]].inputs
-            for robot in self.robots
-            if robot.body.first.moves
-            for tour in self.tours[robot.index]
-        )
+        chains = (self.tours[robot.index] for robot in self.robots if robot.body.first.moves)
+        return any(self.operations[tour[0]].inputs for tours in chains for tour in tours)
 
     @cached_property
     def joins(self) -> Joins:

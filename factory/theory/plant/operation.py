@@ -91,6 +91,23 @@ class Operation:
         inputs = self.template.inputs
         return self.template.before.index(inputs[-1]) if inputs else -1
 
+    def sides(self, robot: int) -> set[int]:
+        """Sides of the approach axis from which one of its robots (index) may come to it."""
+        slot, approach = self.robots.index(robot), self.approach
+        if approach is None or self.before[slot] == NOPART:
+            return {-1, +1}
+        turned = 1 if slot == self.last else -1
+        return {turned * side for side in approach.sides}
+
+    def delivery(self, robot: int) -> tuple[object, ...]:
+        """How one of its robots (index) ends a tour with it: `tool` with its template and the slot,
+        `inserted` into what the carrier holds, or `taken` by a carrier that holds nothing, and
+        whether it is lowered."""
+        slot = self.robots.index(robot)
+        if self.before[slot] == NOPART:
+            return "tool", self.template.name, slot
+        return "taken" if self.pile == NOPART else "inserted", self.lowered == slot
+
     @property
     def start(self) -> TransitionId:
         """The transition X_s."""
