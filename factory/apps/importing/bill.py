@@ -17,7 +17,7 @@ from factory.apps.importing.tree_file import mesh_name
 from factory.support.decimals import number
 from factory.support.errors import Position
 from factory.support.texts import Source, quoted
-from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.parameters import ParameterKind
 
 MOST_COPIES = 10_000
 """The greatest quantity of a row."""
@@ -239,7 +239,7 @@ class BillReader:
     def _value(self, row: BillRow, column: str) -> float | None:
         text = row.cells.get(column, "")
         value = _number(text)
-        kind = GEOMETRY.get(column)
+        kind = ParameterKind.GEOMETRY.get(column)
         unit = self.table.header.units.get(column, 1.0)
         if text and (
             value is None

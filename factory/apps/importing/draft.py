@@ -22,7 +22,6 @@ from factory.api import (
 )
 from factory.support.errors import Position
 from factory.support.texts import where
-from factory.theory.lang.words import is_label
 
 Mates = Literal["many", "chain"]
 """How three or more inputs are mated: in one operation, or one after the other."""
@@ -84,7 +83,7 @@ def label_of(name: str) -> str:
     >>> label_of("Left wing (2x4).ldr")
     'Left-wing-2x4-.ldr'
     """
-    if is_label(name) and name not in PAG.RESERVED and not _FOREIGN.search(name):
+    if PAG.is_label(name) and name not in PAG.RESERVED and not _FOREIGN.search(name):
         return name[:_LONGEST]
     label = _FOREIGN.sub("-", name)[:_LONGEST].strip("-.")
     return f"{label}-" if label in PAG.RESERVED else label

@@ -18,7 +18,6 @@ from factory.apps.importing.tree_file import TreeReader
 from factory.support.collector import collector_paused
 from factory.support.errors import did_you_mean
 from factory.support.texts import quoted, source_of
-from factory.theory.lang.operations import signature
 
 LDRAW, YAML, JSON, BILL = (".ldr", ".mpd", ".dat"), (".yaml", ".yml"), (".json",), (".csv", ".tsv")
 KINDS = (*LDRAW[:2], *JSON, *YAML, *BILL)
@@ -116,9 +115,8 @@ def _drafts(
         made = bill.read(file.stem)
         unused.extend(bill.table.header.unused)
         return made
-    operations = {name: signature(template) for name, template in templates.items()}
     root = read_json(source) if kind in JSON else read_yaml(source)
-    return TreeReader(operations, parts, faults).read(root, file.stem)
+    return TreeReader(templates, parts, faults).read(root, file.stem)
 
 
 def _file(path: Path) -> Path:

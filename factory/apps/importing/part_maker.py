@@ -20,8 +20,7 @@ from factory.support.meshes.mesh_file import ANEW, UnreadableMesh
 from factory.support.meshes.mesh_reader import read_mesh
 from factory.support.rotations import rotation
 from factory.support.texts import near_file, quoted
-from factory.theory.lang.operations import MESHES
-from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.parameters import ParameterKind
 
 CLEAN, NOISE = 0.1, 1e-6
 """A clean rotation is by multiples of so many degrees about the axes; one that differs from it by
@@ -88,7 +87,7 @@ def quaternion(turn: Array) -> tuple[float, ...]:
     return rounded(nearest.as_quat(canonical=True, scalar_first=True))
 
 
-LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)
+LENGTHS = tuple(name for name, kind in ParameterKind.GEOMETRY.items() if kind.long)
 """Parameters in the unit of the file."""
 
 
@@ -158,12 +157,12 @@ class PartMaker:
             hint = "put the mesh in that folder, or name another by --meshes DIR"
             self.faults.add("BadPath", message, position, hint)
             return None
-        named = inside.suffix.lower() in MESHES
-        suffixes = ([""] if named else []) + list(MESHES)
+        named = inside.suffix.lower() in PAG.MESHES
+        suffixes = ([""] if named else []) + list(PAG.MESHES)
         path = first_file(self.folder / f"{inside}{suffix}" for suffix in suffixes)
         if path is None:
             message = f"there is no mesh {quoted(name)} in {quoted(str(self.folder))}"
-            wanted = str(inside) if named else f"{inside}{MESHES[1]}"
+            wanted = str(inside) if named else f"{inside}{PAG.MESHES[1]}"
             hint = near_file(str(self.folder), wanted) or "--meshes DIR names another folder"
             self.faults.add("UnknownMesh", message, position, hint)
             return None

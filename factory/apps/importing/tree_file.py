@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.api import PAG, Parameter, Value
+from factory.api import PAG, Parameter, Template, Value
 from factory.apps.importing.document import DocumentNode as Node
 from factory.apps.importing.draft import (
     MATE,
@@ -20,11 +20,15 @@ from factory.apps.importing.draft import (
 from factory.apps.importing.part_maker import PartMaker, Placement
 from factory.support.errors import did_you_mean
 from factory.support.texts import quoted
-from factory.theory.lang.operations import MESHES, Signature
-from factory.theory.lang.values import GEOMETRY, Kind
+from factory.theory.problem.parameters import ParameterKind
 
 GROUP = ("name", "children", "operation", "parameters", "at", "quat")
-LEAF = ("name", "part", "at", *(name for name in GEOMETRY if name not in ("pos", "mesh")))
+LEAF = (
+    "name",
+    "part",
+    "at",
+    *(name for name in ParameterKind.GEOMETRY if name not in ("pos", "mesh")),
+)
 """The keys of a sub-assembly, and those of a part."""
 
 EXAMPLE = '{"part": "leg.stl", "at": [0, 0, 0.1]} or {"name": "frame", "children": [...]}'
@@ -35,7 +39,7 @@ BARE = '"part": true is a part with no shape of its own'
 class TreeReader:
     """Makes drafts of nodes; errors go to the faults. `operations`: those that nodes may name."""
 
-    operations: Mapping[str, Signature]
+    operations: Mapping[str, Template]
     parts: PartMaker
     faults: ImportFaults
     drafts: list[DraftNode] = field(default_factory=list)
@@ -140,34 +144,35 @@ class TreeReader:
             self.faults.add("BadValue", message, node.position, 'for example "operation": "glue"')
             return
         name = MATE if node is None else str(node.content)
-        operation = self.operations.get(name)
+        template = self.operations.get(name)
         at = draft.position if node is None else node.position
-        if operation is None or operation.inputs == 0 or name == "dropoff":
+        if template is None or not template.inputs or name == "dropoff":
             usable = [o.name for o in self.operations.values() if o.inputs and o.name != "dropoff"]
             hint = did_you_mean(name, sorted(usable), "operations")
             message = f"there is no operation {quoted(name)} on sub-assemblies"
             self.faults.add("UnknownOperation", message, at, hint)
             return
+        operation = template.signature
         few, many = count < operation.inputs and name != MATE, count > operation.inputs
         if few or (many and not operation.further):
             message = f"{quoted(name)} takes {operation.takes}, not {count}"
             hint = "mate the children in a node of their own first"
             self.faults.add("WrongInputs", message, at, hint)
         draft.operation = name
-        draft.parameters = self._parameters(fields.get("parameters"), operation)
+        draft.parameters = self._parameters(fields.get("parameters"), template)
 
-    def _parameters(self, node: Node | None, operation: Signature) -> tuple[Parameter, ...]:
-        made: list[Parameter] = []
+    def _parameters(self, node: Node | None, template: Template) -> tuple[Parameter, ...]:
+        made, kinds = list[Parameter](), template.signature.parameters
         if node is not None and node.kind != "object":
             message = f"'parameters' takes an object, not {node.words}"
             hint = 'for example "parameters": {"dwell": 2}'
             self.faults.add("BadValue", message, node.position, hint)
         elif node is not None:
             for key, value in node.content:
-                kind = operation.parameters.get(str(key.content))
+                kind = kinds.get(str(key.content))
                 if kind is None:
-                    hint = did_you_mean(str(key.content), list(operation.parameters), "parameters")
-                    message = f"{quoted(operation.name)} has no parameter {key.words}"
+                    hint = did_you_mean(str(key.content), list(kinds), "parameters")
+                    message = f"{quoted(template.name)} has no parameter {key.words}"
                     self.faults.add("UnknownParameter", message, key.position, hint)
                 elif (content := self._value(str(key.content), kind, value)) is not None:
                     made.append(Parameter(key.content, content))
@@ -192,12 +197,12 @@ class TreeReader:
         values: dict[str, Value] = {}
         for name, node in fields.items():
             of = "pos" if name == "at" else name
-            value = self._value(name, GEOMETRY[of], node)
+            value = self._value(name, ParameterKind.GEOMETRY[of], node)
             if value is not None:
                 values[of] = value
         return values
 
-    def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
+    def _value(self, name: str, kind: ParameterKind, node: Node) -> Value | None:
         """The value of a parameter; None after a fault."""
         if kind.length == 0 and node.kind == "text" and node.content.isprintable():
             return str(node.content)
@@ -215,7 +220,7 @@ class TreeReader:
 def mesh_name(path: str) -> str:
     """The name of a part from its mesh: the file's name without folder and suffix."""
     name = PurePosixPath(path.replace("\\", "/"))
-    return name.stem if name.suffix.lower() in MESHES else name.name
+    return name.stem if name.suffix.lower() in PAG.MESHES else name.name
 
 
 def _shown(node: Node) -> str:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import dropwhile
 from sys import intern
 from types import MappingProxyType
@@ -15,14 +13,21 @@ from lark import Token
 
 from factory.support.decimals import UNITS, is_number
 from factory.support.errors import Position, did_you_mean
-from factory.support.settings import DWELL
 from factory.support.texts import Findings, near_file, quoted, where
 from factory.theory.lang.statements import Definition, Keyword
 from factory.theory.lang.turns import quaternion_of
-from factory.theory.lang.values import GEOMETRY, WRITTEN, Kind, ValueReader, kind_of
-from factory.theory.lang.words import LABEL_HINT, is_label
-from factory.theory.problem.pag import RESERVED, SHAPES, Assembly, Parameter
-from factory.theory.problem.template import Template
+from factory.theory.lang.values import ValueReader
+from factory.theory.problem.pag import (
+    LABEL_HINT,
+    MESHES,
+    RESERVED,
+    SHAPES,
+    Assembly,
+    Parameter,
+    is_label,
+)
+from factory.theory.problem.parameters import GEOMETRY, WRITTEN
+from factory.theory.problem.template import Signature
 
 
 def _words(meant: Mapping[str, str]) -> Mapping[str, str]:
@@ -57,40 +62,11 @@ MEANT_OPERATIONS = _words(
 )
 """The operations that are meant by words that people write in their place."""
 
-MESHES = (".obj", ".stl", ".ply", ".glb")
-
 PLANNED = (".step", ".stp", ".3mf", ".off", ".iges", ".igs")
 """Endings of CAD files that are no meshes of a PAG."""
 
 ROTATIONS = ("turn", "quat")
 """Parameters that give a part a rotation."""
-
-
-@dataclass(frozen=True, slots=True)
-class Signature:
-    """What an operation takes: the least number of inputs, whether more, and its parameters."""
-
-    name: str
-    inputs: int
-    further: bool
-    parameters: Mapping[str, Kind]
-
-    @property
-    def takes(self) -> str:
-        """The number of inputs in words."""
-        if not self.inputs and not self.further:
-            return "no sub-assembly"
-        number = ("no", "one", "two", "three", "four", "five")[self.inputs : self.inputs + 1]
-        words = (number[0] if number else str(self.inputs)) + " or more" * self.further
-        return f"{words} sub-assembl{'y' if words == 'one' else 'ies'}"
-
-
-def signature(template: Template) -> Signature:
-    """The signature of a template."""
-    kinds = dict(WRITTEN) if template.geometry else {}
-    for name, default in template.parameters:
-        kinds[name] = kind_of(default, DWELL if name == template.law.dwell else math.inf)
-    return Signature(template.name, len(template.inputs), bool(template.further), kinds)
 
 
 class AssemblyReader:

@@ -23,7 +23,7 @@ from factory.support.errors import did_you_mean, usage_error
 from factory.support.guard import reading
 from factory.support.texts import Findings, quoted, source_of
 from factory.theory.lang.mixes import mix_of
-from factory.theory.lang.operations import AssemblyReader, signature
+from factory.theory.lang.operations import AssemblyReader
 from factory.theory.lang.pag_syntax import read_statements
 from factory.theory.lang.source import STDIN, read_text
 from factory.theory.lang.statements import (
@@ -84,7 +84,7 @@ def read_pag(
     """
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
-    signatures = {name: signature(template) for name, template in templates.items()}
+    signatures = {name: template.signature for name, template in templates.items()}
     unit = unit_of(statements, findings)
     reader = AssemblyReader(findings, signatures, folder, unit)
     nodes = tuple(map(reader.read, written_out(statements, findings)))

@@ -20,9 +20,9 @@ from factory.theory.lang.template_syntax import (
     TemplateDraft,
     Words,
 )
-from factory.theory.lang.values import WRITTEN, ValueReader
-from factory.theory.lang.words import LABEL_HINT, is_label
-from factory.theory.problem.pag import NOPART, RESERVED, Value
+from factory.theory.lang.values import ValueReader
+from factory.theory.problem.pag import LABEL_HINT, NOPART, RESERVED, Value, is_label
+from factory.theory.problem.parameters import WRITTEN
 from factory.theory.problem.template import LOST, Failure, Law, Point, Template
 
 _POINT = re.compile(r"([ABS])([0-9]+)(?:([+-])([0-9.]*(?:[eE][+-]?[0-9]+)?)r)?")

@@ -13,8 +13,7 @@ from factory.support.errors import Position, did_you_mean
 from factory.support.texts import Findings, quoted, where
 from factory.theory.lang.mixes import check_mix
 from factory.theory.lang.statements import Statements
-from factory.theory.lang.words import LABEL_HINT, is_label
-from factory.theory.problem.pag import RESERVED, Assembly
+from factory.theory.problem.pag import LABEL_HINT, RESERVED, Assembly, is_label
 
 SUGGESTIONS = 20
 """Undefined labels that get a suggestion."""

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from collections.abc import Sequence
+from dataclasses import replace
 
 from lark import Token
 
@@ -16,75 +14,7 @@ from factory.support.texts import Findings, quoted
 from factory.theory.lang.pag_syntax import spelled
 from factory.theory.lang.statements import Vector
 from factory.theory.problem.pag import Value
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """The kind of a parameter: `length` 0 is a text, 1 a number, n a vector of n numbers.
-
-    Each number lies in [low, high], and above 0 where `positive`; `zero`: a vector may be all zero;
-    `long`: it is a length, in the unit of the text. `example` is shown with an error.
-    """
-
-    length: int
-    example: str
-    low: float = -math.inf
-    high: float = math.inf
-    positive: bool = False
-    zero: bool = True
-    long: bool = False
-
-    def allows(self, number: float) -> bool:
-        """Whether one number lies within the bounds."""
-        return self.low <= number <= self.high and (number > 0 or not self.positive)
-
-    def fits(self, numbers: tuple[float, ...]) -> bool:
-        """Whether these finite numbers are a value of this kind."""
-        if not 0 < len(numbers) == self.length or not (self.zero or any(numbers)):
-            return False
-        return all(math.isfinite(value) and self.allows(value) for value in numbers)
-
-    @property
-    def wanted(self) -> str:
-        """The kind in words."""
-        if self.length == 0:
-            return "a text in double quotes"
-        sort = "positive " if self.positive else ""
-        among = f" from {self.low:g} to {self.high:g}" if math.isfinite(self.high) else ""
-        if self.low == 0 and not among:
-            among = " >= 0"
-        return (
-            f"a {sort}number{among}" if self.length == 1 else f"{self.length} {sort}numbers{among}"
-        )
-
-
-GEOMETRY: Mapping[str, Kind] = MappingProxyType(
-    {
-        "mesh": Kind(0, '"bricks/3001.obj"'),
-        "scale": Kind(1, "0.001", positive=True, long=True),
-        "pos": Kind(3, "( 0, 0, 0.1 )", long=True),
-        "quat": Kind(4, "( 1, 0, 0, 0 )", zero=False),
-        "density": Kind(1, "1050", positive=True),
-        "mass": Kind(1, "0.1", positive=True),
-        "rgba": Kind(4, "( 0.8, 0.1, 0.1, 1 )", low=0.0, high=1.0),
-        "box": Kind(3, "( 0.1, 0.1, 0.05 )", positive=True, long=True),
-        "cylinder": Kind(2, "( 0.02, 0.1 )", positive=True, long=True),
-        "sphere": Kind(1, "0.05", positive=True, long=True),
-        "fed": Kind(1, "0.61", low=-3.15, high=3.15),
-    }
-)
-
-WRITTEN: Mapping[str, Kind] = MappingProxyType({**GEOMETRY, "turn": Kind(3, "( 0, 0, 90 )")})
-"""The same, and those that a text may have in their place: `turn`, which is read as a `quat`."""
-
-
-def kind_of(default: Value, high: float = math.inf) -> Kind:
-    """The kind of a template's parameter, from its default: one >= 0 has no negative values."""
-    if isinstance(default, str):
-        return Kind(0, f'"{default}"')
-    if isinstance(default, tuple):
-        return Kind(len(default), "( " + ", ".join(map(repr, default)) + " )")
-    return Kind(1, repr(default), low=0.0 if default >= 0 else -math.inf, high=high)
+from factory.theory.problem.parameters import GEOMETRY, ParameterKind
 
 
 def text_of(token: Token) -> str:
@@ -104,7 +34,7 @@ class ValueReader:
         whole = isinstance(raw, Token) and raw.type == "VECTOR"
         return replace(at, column=at.column + raw.index("(")) if whole else at
 
-    def read(self, name: str, kind: Kind, raw: Token | Vector) -> Value | None:
+    def read(self, name: str, kind: ParameterKind, raw: Token | Vector) -> Value | None:
         """The value of the parameter `name`, or None after an error (BadValue) has been noted."""
         if isinstance(raw, Token) and raw.type == "VECTOR":
             return self._vector(name, kind, spelled(raw))
@@ -123,10 +53,16 @@ class ValueReader:
         """A value of any kind: a template's default."""
         if isinstance(raw, Vector):
             length = len(raw.words)
-            return self._vector(name, Kind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw)
-        return text_of(raw) if raw.type == "STRING" else self._number(name, Kind(1, "1.0"), raw)
+            return self._vector(
+                name, ParameterKind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw
+            )
+        return (
+            text_of(raw)
+            if raw.type == "STRING"
+            else self._number(name, ParameterKind(1, "1.0"), raw)
+        )
 
-    def _colour(self, name: str, kind: Kind, raw: Token) -> Value | None:
+    def _colour(self, name: str, kind: ParameterKind, raw: Token) -> Value | None:
         """A colour by its name in CSS, or by "#rrggbb"."""
         from PIL.ImageColor import colormap, getrgb
 
@@ -141,7 +77,7 @@ class ValueReader:
         self.findings.add("BadValue", f"{quoted(word)} is no colour", raw, hint)
         return None
 
-    def _vector(self, name: str, kind: Kind, raw: Vector) -> Value | None:
+    def _vector(self, name: str, kind: ParameterKind, raw: Vector) -> Value | None:
         if kind.length < 2 or len(raw.words) != kind.length:
             count = f"{len(raw.words)} number{'s' * (len(raw.words) != 1)} in parentheses"
             problem = f"takes {kind.wanted}, not {count}"
@@ -156,7 +92,7 @@ class ValueReader:
             return None
         return numbers
 
-    def _number(self, name: str, kind: Kind, word: Token) -> float | None:
+    def _number(self, name: str, kind: ParameterKind, word: Token) -> float | None:
         value = number(word, self.unit if kind.long else "m")
         if value is not None and kind.allows(value):
             return value
@@ -173,14 +109,16 @@ class ValueReader:
         self._refuse(name, kind, word, why, hint)
         return None
 
-    def _refuse(self, name: str, kind: Kind, token: Token, problem: str, better: str = "") -> None:
+    def _refuse(
+        self, name: str, kind: ParameterKind, token: Token, problem: str, better: str = ""
+    ) -> None:
         hint = better or f"for example: {name} = {kind.example}"
         if kind.length == 0 and token.type == "WORD":
             hint = f'in quotes: {name} = "{token}"'
         self.findings.add("BadValue", f"{quoted(name)} {problem}", token, hint)
 
 
-def _better(kind: Kind, words: Sequence[Token]) -> str:
+def _better(kind: ParameterKind, words: Sequence[Token]) -> str:
     """A hint for a rotation, or for a colour of three numbers; "" for other values."""
     if kind is GEOMETRY["quat"]:
         return "(w, x, y, z); in degrees, 90 about z: turn = ( 0, 0, 90 )"

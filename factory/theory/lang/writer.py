@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from factory.theory.lang.turns import quaternion_of, turn_of
-from factory.theory.lang.words import is_label
 from factory.theory.problem.pag import (
     PAG,
     RESERVED,
@@ -15,6 +14,7 @@ from factory.theory.problem.pag import (
     Mix,
     Parameter,
     Value,
+    is_label,
 )
 from factory.theory.problem.template import LOST, Failure, Law, Template
 

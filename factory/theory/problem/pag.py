@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,8 +22,20 @@ RESERVED = frozenset({NOPART, "root", "mix", "parts", "dropoff"})
 SHAPES = ("mesh", "box", "cylinder", "sphere")
 """Parameters that give a part a shape."""
 
+MESHES = (".obj", ".stl", ".ply", ".glb")
+"""Endings of the mesh files that a part may name."""
+
+LABEL_HINT = "a label has letters, digits, '_', '-' and '.'"
+
+_LABEL = re.compile(r"[^\s+;,()=<>{}~\"/]+")
+
 Value = float | str | tuple[float, ...]
 """The value of a parameter: a number, a word or a vector."""
+
+
+def is_label(word: str) -> bool:
+    """Whether a word may be a label."""
+    return _LABEL.fullmatch(word) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +138,8 @@ class PAG(Pictured):
 
     RESERVED: ClassVar[frozenset[str]] = RESERVED
     SHAPES: ClassVar[tuple[str, ...]] = SHAPES
+    MESHES: ClassVar[tuple[str, ...]] = MESHES
+    is_label = staticmethod(is_label)
 
     root: str
     nodes: tuple[Assembly, ...]

@@ -6,12 +6,16 @@ The text of a template is read by `factory.theory.lang.read_template`; the shipp
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from math import inf
 from typing import Literal
 
 from factory.support.errors import Position
+from factory.support.settings import DWELL
 from factory.theory.problem.pag import NOPART, Value
+from factory.theory.problem.parameters import WRITTEN, ParameterKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,32 @@ LOST = (Failure("lost", None, (Response("scrap"),)),)
 
 
 @dataclass(frozen=True, slots=True)
+class Signature:
+    """What an operation takes.
+
+    Attributes:
+        name: its name.
+        inputs: the least number of its inputs.
+        further: whether it takes more.
+        parameters: the kinds of its parameters, by name.
+    """
+
+    name: str
+    inputs: int
+    further: bool
+    parameters: Mapping[str, ParameterKind]
+
+    @property
+    def takes(self) -> str:
+        """The number of inputs in words."""
+        if not self.inputs and not self.further:
+            return "no sub-assembly"
+        number = ("no", "one", "two", "three", "four", "five")[self.inputs : self.inputs + 1]
+        words = (number[0] if number else str(self.inputs)) + " or more" * self.further
+        return f"{words} sub-assembl{'y' if words == 'one' else 'ies'}"
+
+
+@dataclass(frozen=True, slots=True)
 class Template:
     """An operation template (Definition 4.1).
 
@@ -143,6 +173,14 @@ class Template:
     def inputs(self) -> tuple[str, ...]:
         """The sub-assemblies: the label variables of a, in the order in which they are written."""
         return _variables(self.before)
+
+    @property
+    def signature(self) -> Signature:
+        """What it takes. A duration has a greatest value."""
+        kinds = dict(WRITTEN) if self.geometry else {}
+        for name, default in self.parameters:
+            kinds[name] = ParameterKind.of(default, DWELL if name == self.law.dwell else inf)
+        return Signature(self.name, len(self.inputs), bool(self.further), kinds)
 
     @property
     def held(self) -> str:
