@@ -18,6 +18,7 @@ from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 from factory.support.tables import MISFITS, misfit
+from factory.theory.compiler.assigning import beside, shared
 from factory.theory.compiler.compiler import compile_pag
 from factory.theory.compiler.expanding import Node
 from factory.theory.compiler.turning import check_shapes, placed
@@ -242,30 +243,26 @@ class Project:
 
         lifts, (_, place) = lifts_for(self._unlifted, self.catalogue), on_stems(factory)
         plan = replace(plan, lifts=frozenset(r for r, at in enumerate(place) if at in lifts))
-        return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
+        if not plan.lifts:
+            return replace(factory, plan=plan)
+        return shared(self.approached, plan, self.catalogue)
 
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
         if self.plan.turns or self.plan.names or self.plan.tees:
-            return self._shared(self.plan)
+            return shared(self.approached, self.plan, self.catalogue)
         if self.pag.mix is None:
             return self.compiled
         from factory.floor.layout.sequencing import sequenced
 
         inputs = self.pag.mix, self.product, self.catalogue, self.settings
-        return self._shared(sequenced(self.approached, *inputs))
-
-    def _shared(self, plan: Plan) -> Factory:
-        from factory.theory.compiler.assigning import shared
-
-        return shared(self.approached, plan, self.catalogue)
+        return shared(self.approached, sequenced(self.approached, *inputs), self.catalogue)
 
     @cached_property
     def approached(self) -> Factory:
         """`compiled`, with how inputs come together where that is free: in default boxes."""
         from factory.floor.mating.mating import judged
-        from factory.theory.compiler.assigning import beside
 
         if self.pag.mix is not None:
             return beside(self.pag, [one.approached for one in self.each])
@@ -281,8 +278,6 @@ class Project:
         """The factory of the plan, with a robot for each tour and without relays. Raises InputError
         where there is no such factory."""
         if self.pag.mix is not None:
-            from factory.theory.compiler.assigning import beside
-
             return beside(self.pag, [one.compiled for one in self.each])
         factory = compile_pag(
             self.pag, self.templates, self.catalogue, self.approaches, self._single
@@ -295,6 +290,12 @@ class Project:
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory
+
+    @property
+    def unshaped(self) -> Factory:
+        """The factory of the plan without regard to shapes: no mesh is read. Raises InputError."""
+        parts = self.pag, self.templates, self.catalogue
+        return shared(compile_pag(*parts, {}, self.plan), self.plan, self.catalogue)
 
     @cached_property
     def layout(self) -> Layout:
@@ -333,8 +334,7 @@ class Project:
 
     @property
     def factory(self) -> Factory:
-        """The factory with the relays of its layout if its ground asks for them, else the plain
-        one. Raises as these do."""
+        """The factory with the relays of its layout if its ground asks for them, else `plain`."""
         return self.layout.factory if self.ground.relays else self.plain
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import atan2, degrees
 
-from factory.engine.mjcf.loading import compiled
 from factory.engine.mjcf.replica import Replica
 from factory.film.action import action_of
 from factory.film.dress import dressed
@@ -13,6 +12,7 @@ from factory.film.filament import settings
 from factory.film.look import CLASSIC_FLOOR, FILAMENT_FLOOR
 from factory.film.picture import Camera
 from factory.film.vantage import overview
+from factory.support.compiling import compiled
 from factory.support.engine import mujoco
 from factory.support.pictures.sight import Framing
 

@@ -11,7 +11,6 @@ from factory.apps.analyze.firing import slacks
 from factory.apps.analyze.measured import Comparison, RunRecord, compare
 from factory.apps.analyze.timed import Circuit, Flow, TimedNet, flow, timed_net
 from factory.apps.drawing.tables import Tabular, titled
-from factory.engine.timing.pool import part_pool
 from factory.engine.timing.timing import Change
 from factory.support.errors import did_you_mean, usage_error
 
@@ -127,7 +126,7 @@ def least_wip(timing: Timing) -> int:
     """The least bound on copies of each part with the full pace, by bisection: the cycle time never
     grows with the bound."""
     net = timed_net(timing)
-    low, high = 0, max(part_pool(timing.factory).values()) * timing.factory.period
+    low, high = 0, max(net.pool.values()) * timing.factory.period
     while high - low > 1:
         middle = (low + high) // 2
         enough = timed_net(timing, wip=middle).pace <= net.pace * (1 + net.SAME)

@@ -6,7 +6,7 @@ from factory.api import Diagnostic, InputError
 from factory.apps.log.admission import admitted
 from factory.apps.log.content import AGAIN
 from factory.apps.log.reader import Log, Ragged
-from factory.engine.mjcf.loading import compiled
+from factory.support.compiling import compiled
 from factory.support.engine import mujoco
 
 

@@ -38,8 +38,6 @@ from factory.apps.log.cell_table import CellTable
 from factory.apps.log.content import AGAIN
 from factory.engine.record.history import firings
 from factory.support.tables import MISFITS, misfit, table_of, value_of
-from factory.theory.compiler.assigning import shared
-from factory.theory.compiler.compiler import compile_pag
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,11 +171,10 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
 
 def _compiled(header: Mapping[str, Any]) -> Factory:
     """The factory on rails of a header."""
-    made, catalogue = ProjectTable.of(header), load_catalogue()
+    made = ProjectTable.of(header)
     templates = _templates(made)
     pag = read_pag(made.pag.text, templates, made.pag.file, None)
-    single = compile_pag(pag, templates, catalogue, {}, made.plan)
-    return shared(single, made.plan, catalogue)
+    return Project(pag, templates, load_catalogue(), plan=made.plan).unshaped
 
 
 def check_names(factory: Factory, header: Mapping[str, Any]) -> None:

@@ -8,7 +8,16 @@ from functools import partial
 
 import numpy as np
 
-from factory.api import NOPART, Diagnostic, Failing, Marking, Operation, Simulation, Undone
+from factory.api import (
+    NOPART,
+    Diagnostic,
+    Failing,
+    LayoutMachines,
+    Marking,
+    Operation,
+    Simulation,
+    Undone,
+)
 from factory.apps.deviations.campaign import Campaign
 from factory.apps.recovery.books import RunState
 from factory.apps.recovery.plant import Plant
@@ -16,7 +25,6 @@ from factory.apps.recovery.returning import Goal, ReturnMotion, WayBack, order_o
 from factory.apps.recovery.standing import MotionHold
 from factory.apps.recovery.undo import marking_after, undo
 from factory.apps.recovery.wasting import OnEnd, ScrapRouting
-from factory.floor.layout.scrapping import not_carried_back
 
 SCRAPS = 20
 """So many scraps of one operation on end stop the run: something else is wrong."""
@@ -53,7 +61,7 @@ class RecoveryPolicy:
         self.dead: dict[int, float] = {}
         self.used_spares = 0
         self._on_end = OnEnd()
-        self._wasting = ScrapRouting(not_carried_back(simulation.layout))
+        self._wasting = ScrapRouting(LayoutMachines(simulation.layout).not_carried_back)
 
     def passed(self, operation: Operation) -> None:
         """Note that an operation has passed its tests."""

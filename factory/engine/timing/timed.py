@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from factory.engine.timing.cycle_time import CycleTime
 from factory.engine.timing.earliest import earliest_firings
-from factory.engine.timing.pool import with_wip
+from factory.engine.timing.pool import part_pool, with_wip
 from factory.engine.timing.timing import AS_IT_IS, Change, Timing
 from factory.floor.layout.layout import Layout
 from factory.support.arrays import Array
@@ -84,6 +84,11 @@ class Timed:
         if "magazine" in modes:
             return f"{self.FEEDER} {modes['magazine']}"
         return self.timing.factory.robots[self.busiest[0]].name
+
+    @property
+    def pool(self) -> Mapping[str, int]:
+        """For each part the greatest number of copies inside at once, under the bound `wip`."""
+        return part_pool(self.timing.factory, self.wip)
 
     @cached_property
     def ready(self) -> Mapping[int, float]:

@@ -25,6 +25,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.outfeed import away, shed_with_uprights
 from factory.floor.layout.presence import ROUNDING, Presence
+from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.starting import start_positions
 from factory.floor.layout.staying import Staying, in_world
 from factory.floor.layout.sweeps import piles_of, regions, regions_of
@@ -77,6 +78,11 @@ class LayoutMachines:
         """The same for a robot that goes straight ahead from its feeder (0), or to its side t (+1),
         or to the other (-1)."""
         return cleared(self.layout, robot, sideways)
+
+    @property
+    def not_carried_back(self) -> frozenset[tuple[int, str]]:
+        """The pairs of a robot (index) and a label that it cannot carry back to its B end."""
+        return not_carried_back(self.layout)
 
     @property
     def shed(self) -> tuple[Box, float]:

@@ -14,7 +14,7 @@ from functools import partial
 from math import ceil
 from typing import ClassVar
 
-from factory.engine.mjcf.loading import compiled, fingerprint, load
+from factory.engine.mjcf.loading import fingerprint, load
 from factory.engine.mjcf.model import Model
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import EngineView, Observation
@@ -34,6 +34,7 @@ from factory.engine.simulation.request import RunRequest
 from factory.engine.simulation.world import Drop, Hooks, Job
 from factory.engine.timing.demand import Word
 from factory.support.arrays import Array, Index
+from factory.support.compiling import compiled
 from factory.support.engine import by_name, mujoco
 from factory.support.settings import MOST
 from factory.theory.control.navigation import Bundle
