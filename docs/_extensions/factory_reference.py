@@ -27,7 +27,7 @@ from factory.support.resources import mjcf_folder
 from factory.support.settings import Settings
 from factory.support.user_defaults import OPTIONS
 from factory.theory.lang.template_reader import all_templates
-from factory.theory.lang.values import WRITTEN
+from factory.theory.problem.parameters import WRITTEN
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx

@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 
+from factory.floor.layout.carrying_back import not_carried_back
 from factory.floor.layout.crowding import separation
-from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.sweeps import piles_of
 from factory.floor.robots.catalogue import load_catalogue
 from factory.support.errors import InputError

@@ -23,7 +23,7 @@ from factory.floor.robots.catalogue import load_catalogue
 from factory.support.explanations import codes
 from factory.support.settings import Settings
 from factory.theory.lang.template_reader import all_templates
-from factory.theory.lang.values import GEOMETRY
+from factory.theory.problem.parameters import GEOMETRY
 from tests.command_line import Terminal
 from tests.paths import ROOT
 from tests.slow import slow_but

@@ -17,11 +17,11 @@ import numpy as np
 import shapely
 from shapely import STRtree
 
+from factory.floor.layout.carrying_back import not_carried_back
 from factory.floor.layout.certificate import BIN_BODY, PAYLOAD_BODY, STATIONS, Region
 from factory.floor.layout.crowding import Crowding, separation
 from factory.floor.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
 from factory.floor.layout.layout import Layout
-from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.sweeps import Pile, piles_of, regions
 from factory.support.boxes import Box, Point2, hull, moved
 from factory.theory.problem.pag import NOPART

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from factory.floor.layout.bending import Detour, bent
+from factory.floor.layout.carrying_back import not_carried_back
 from factory.floor.layout.certificate import Certificate, Exclusions, Fault, Precedence, Region
 from factory.floor.layout.clearance import certify
 from factory.floor.layout.coordinating import Coordinated, with_machines
@@ -25,7 +26,6 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.machines import presences
 from factory.floor.layout.outfeed import away, shed_with_uprights
 from factory.floor.layout.presence import ROUNDING, Presence
-from factory.floor.layout.scrapping import not_carried_back
 from factory.floor.layout.starting import start_positions
 from factory.floor.layout.staying import Staying, in_world
 from factory.floor.layout.sweeps import piles_of, regions, regions_of

@@ -1,4 +1,4 @@
-"""Piles that a robot can carry back to the B end of its guidepath as scrap.
+"""Piles that a robot can carry back to the B end of its guidepath.
 
 A pile is swept from where it is complete back to B, and compared with all regions of the layout,
 wherever the other robots are. A pile that may come too near to one of them is dropped
