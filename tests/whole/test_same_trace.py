@@ -16,7 +16,6 @@ from factory.apps.deviations import Deviation, deviate
 from factory.apps.fidelity.measuring import Measurement
 from factory.apps.log import LogWriter
 from factory.apps.monitor import beside
-from factory.engine.mjcf import loading
 from factory.engine.record.figures import PhysicsFigures
 from factory.engine.record.state import Event, State
 from factory.engine.simulation import bundles
@@ -27,6 +26,7 @@ from factory.engine.simulation.mujoco.fast import neighbours, strides
 from factory.engine.simulation.mujoco.parts import Parts
 from factory.engine.simulation.simulation import Simulation
 from factory.floor.layout.layout import Layout
+from factory.support import compiling
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from factory.theory.control.navigation import Bundle
@@ -130,8 +130,8 @@ def handing_over_singly() -> Iterator[None]:
 def in_pieces() -> Iterator[None]:
     """The engine reads the model piece by piece."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(loading, "MANY", 0)
-        patch.setattr(loading, "PIECE", 100)
+        patch.setattr(compiling, "MANY", 0)
+        patch.setattr(compiling, "PIECE", 100)
         yield
 
 
