@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 MOST = 500_000_000
 """The most bytes that the entries of a folder take together."""
 
+ATOMS = frozenset({str, int, float, bool, type(None)})
+"""Types of values whose `repr` differs where they differ."""
+
 SUFFIX = ".entry"
 """The ending of the files of entries."""
 
@@ -60,24 +63,35 @@ def digest(*parts: object) -> str:
     return total.hexdigest()
 
 
-def content(value: Any, seen: dict[int, object] | None = None) -> object:
+def content(value: Any, seen: dict[int, str] | None = None) -> object:
     """What `digest` tells a value by, whatever holds it: a digest of a dataclass by the fields that
-    are compared, of a mapping, a tuple or a set by what is in it; else the value itself. `seen`:
-    the contents of dataclasses that the value shares with others, by their identities."""
+    are compared, and of an array; tuples of what is in a mapping, a tuple or a set; else the value
+    itself. `seen`: the digests of dataclasses that the value shares with others, by their
+    identities."""
+    kind: Any = type(value)
+    if kind in ATOMS:
+        return value
     seen = {} if seen is None else seen
-    if is_dataclass(value):
+    if (names := _compared(kind)) is not None:
         if id(value) not in seen:
-            values = (getattr(value, field.name) for field in fields(value) if field.compare)
-            parts = [content(one, seen) for one in values]
-            seen[id(value)] = digest(type(value).__qualname__, *parts)
+            parts = [content(getattr(value, name), seen) for name in names]
+            seen[id(value)] = digest(kind.__qualname__, *parts)
         return seen[id(value)]
     if isinstance(value, Mapping):
-        return digest("mapping", *(content(one, seen) for both in value.items() for one in both))
+        return "mapping", *[(content(k, seen), content(v, seen)) for k, v in value.items()]
     if isinstance(value, tuple | list):
-        return digest("tuple", *(content(one, seen) for one in value))
+        return tuple([content(one, seen) for one in value])
     if isinstance(value, set | frozenset):
-        return digest("set", *sorted(map(digest, (content(one, seen) for one in value))))
-    return value
+        return "set", *sorted([repr(content(one, seen)) for one in value])
+    return digest(value) if hasattr(value, "dtype") else value
+
+
+@cache
+def _compared(kind: Any) -> tuple[str, ...] | None:
+    """The names of the fields of a dataclass that are compared; None for another type."""
+    if not is_dataclass(kind):
+        return None
+    return tuple(field.name for field in fields(kind) if field.compare)
 
 
 @cache

@@ -55,14 +55,23 @@ def table_of(value: Any) -> Any:
     Args:
         value: a dataclass, mapping, tuple, set, text or number.
     """
-    if is_dataclass(value):
-        held = ((field, getattr(value, field.name)) for field in fields(value))
-        return {f.name: table_of(v) for f, v in held if not _is_default(f, v)}
+    kind: Any = type(value)
+    if kind in WORDS:
+        return value
+    if held := _fields_of(kind):
+        pairs = [(field, getattr(value, field.name)) for field in held]
+        return {f.name: table_of(v) for f, v in pairs if not _is_default(f, v)}
     if isinstance(value, Mapping):
         return {key: table_of(item) for key, item in value.items()}
     if isinstance(value, frozenset):
         return sorted(value)
     return [*map(table_of, value)] if isinstance(value, tuple) else value
+
+
+@cache
+def _fields_of(kind: Any) -> tuple[Field[Any], ...]:
+    """The fields of a dataclass; none of another type."""
+    return fields(kind) if is_dataclass(kind) else ()
 
 
 def value_of(kind: type[T], table: Any, place: str = "") -> T:

@@ -24,6 +24,7 @@ from factory.floor.layout.layout import Layout
 from factory.floor.layout.saved import LayoutTable
 from factory.floor.mating.mating import judged
 from factory.support.cache import content, digest, load, program, store
+from factory.support.collector import collector_paused
 from factory.support.tables import table_of, value_of
 from factory.theory.plant.factory import Factory
 
@@ -60,6 +61,7 @@ class FoundLayout:
         return laid
 
 
+@collector_paused()
 def kept_or(
     find: Callable[[], Layout], factory: Factory, product: Product, hands: Hands, *asked: object
 ) -> Layout:

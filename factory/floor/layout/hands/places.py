@@ -179,8 +179,9 @@ def places(
     first = np.lexsort((away, np.round(-out, 3)))[:TRIED]
     nearest = np.argsort(away)[: len(points) if small else NEAR]
     beside = np.abs(points[:, None, across] - asked[:, across]).max(axis=2)
-    kept = np.flatnonzero(beside.min(axis=1, initial=np.inf) < ASKED)
-    points = points[np.unique(np.concatenate([first, nearest, kept]))]
+    kept = beside.min(axis=1, initial=np.inf) < ASKED
+    kept[first] = kept[nearest] = True
+    points = points[kept]
     sizes, load = np.array(radii), loads.about(points)
     used = strain(tip("suction"), side, sizes[:, None], load)
     useful = [n for n, radius in enumerate(radii) if radius <= LEAST or used[n].max() > EASY]
@@ -315,8 +316,7 @@ def _covered(
     pad over which its bellows reach the surface, and the position of its face along the axis, on
     what stands out most under it [m]."""
     (axis, way), sizes = side, np.array(radii)
-    every = (sizes[:, None] * _ring(axis)[:, None]).reshape(-1, 3)
-    rims, which = np.unique(every, axis=0, return_inverse=True)  # a pad's middle is all pads'
+    rims, which = _rims(axis, tuple(radii))
     out = surfaces.outermost(parts, (rims[:, None] + points).reshape(-1, 3), side)
     out = out.reshape(len(rims), -1)[which].reshape(2 * RAYS + 1, len(sizes), -1)
     bodies = [body for part in parts for body in surfaces.bodies[part]]
@@ -327,9 +327,17 @@ def _covered(
 
 
 @cache
+def _rims(axis: int, radii: tuple[float, ...]) -> tuple[Array, Index]:
+    """Where in pads across an axis it is looked at what these cover (m, 3) [m], and which of it is
+    each place in each pad (13 n,): their middle is that of all."""
+    every = np.array(radii)[:, None] * _ring(axis)[:, None]
+    rims, which = np.unique(every.reshape(-1, 3), axis=0, return_inverse=True)
+    return rims, which
+
+
+@cache
 def _ring(axis: int) -> Array:
-    """Where in a pad of radius 1 across an axis it is looked at what that covers (13, 3): on its
-    rim, half-way there, and in its middle."""
+    """The same in a pad of radius 1 (13, 3): on its rim, half-way there, and in its middle."""
     turns, ring = np.arange(RAYS) * 2 * pi / RAYS, np.zeros((2 * RAYS + 1, 3))
     rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     ring[:-1, [a for a in range(3) if a != axis]] = np.concatenate([rim, rim / 2])

@@ -30,6 +30,9 @@ Way = tuple[float, float]
 TOUCH = 1e-5
 """Boxes that overlap by no more only touch [m]."""
 
+MANY = 1 << 16
+"""The most pairs of bodies and points that are looked at at a time."""
+
 FEW = 4
 """Of more boxes than this those that are near are looked for first."""
 
@@ -169,13 +172,18 @@ class Surfaces:
         (axis, way), reach = side, np.full(len(points), -np.inf)
         one, other = (a for a in range(3) if a != axis)
         x, y = points[:, one].copy(), points[:, other].copy()
-        bodies = [(body.out(side), body) for part in parts for body in self.bodies[part]]
+        every = [body for part in parts for body in self.bodies[part]]
+        boxes = np.array([(b.low, b.high) for b in every if b.boxed]).reshape(-1, 2, 3)
+        for some in np.array_split(boxes, len(boxes) * len(x) // MANY + 1):
+            low, high = some[:, 0], some[:, 1]
+            over = (x >= low[:, one, None]) & (x <= high[:, one, None])
+            over &= (y >= low[:, other, None]) & (y <= high[:, other, None])
+            ends = way * (high if way > 0 else low)[:, axis, None]
+            reach = np.maximum(reach, np.where(over, ends, -np.inf).max(axis=0, initial=-np.inf))
+        bodies = [(body.out(side), body) for body in every if not body.boxed]
         for out, body in sorted(bodies, key=lambda pair: -pair[0]):
             low, high = body.low, body.high
             beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
-            if body.boxed:
-                np.maximum(reach, out, out=reach, where=beside)
-                continue
             # what ends further in than what is known is not looked at
             near = np.flatnonzero(beside & (reach < out + FLAT))
             enter, leave = body.crossed(points[near], axis)
