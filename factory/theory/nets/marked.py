@@ -25,6 +25,9 @@ NONE = TransitionId(-1)
 MANY = TransitionId(-2)
 """The producer or consumer of a place that has several."""
 
+FEW = 8
+"""Up to so many gears through a place are counted one by one."""
+
 
 @dataclass(frozen=True)
 class MarkedNet(Pictured):
@@ -140,10 +143,11 @@ class MarkedNet(Pictured):
         for number, gear in enumerate(self.gears):
             alone = (number,)
             for place in gear.places:
-                if owners[place]:
-                    shared.setdefault(place, [*owners[place]]).append(number)
+                on = owners[place]
+                if len(on) < FEW:
+                    owners[place] = on + alone if on else alone
                 else:
-                    owners[place] = alone
+                    shared.setdefault(place, [*on]).append(number)
         for several, gears in shared.items():
             owners[several] = tuple(gears)
         return tuple(owners)

@@ -7,7 +7,7 @@ here they stay two.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -69,12 +69,12 @@ class PetriNet:
     @cached_property
     def preset(self) -> tuple[tuple[PlaceId, ...], ...]:
         """For each transition e the places of its preset, •e."""
-        return self._adjacent("right")
+        return self._around[0]
 
     @cached_property
     def postset(self) -> tuple[tuple[PlaceId, ...], ...]:
         """For each transition e the places of its postset, e•."""
-        return self._adjacent("left")
+        return self._around[1]
 
     @cached_property
     def place_index(self) -> dict[str, PlaceId]:
@@ -86,11 +86,20 @@ class PetriNet:
         """Transition indices by name."""
         return {event.name: TransitionId(i) for i, event in enumerate(self.transitions)}
 
-    def _adjacent(self, side: str) -> tuple[tuple[PlaceId, ...], ...]:
+    @cached_property
+    def _around(self) -> tuple[tuple[tuple[PlaceId, ...], ...], tuple[tuple[PlaceId, ...], ...]]:
+        """All presets, and all postsets, which share the numbers of places."""
+        numbers = [*map(PlaceId, range(len(self.places)))]
+        before = self._adjacent((place.right for place in self.places), numbers)
+        return before, self._adjacent((place.left for place in self.places), numbers)
+
+    def _adjacent(
+        self, sides: Iterable[tuple[TransitionId, ...]], numbers: Sequence[PlaceId]
+    ) -> tuple[tuple[PlaceId, ...], ...]:
         adjacent: list[list[PlaceId]] = [[] for _ in self.transitions]
-        for index, place in enumerate(self.places):
-            for event in getattr(place, side):
-                adjacent[event].append(PlaceId(index))
+        for number, events in zip(numbers, sides, strict=True):
+            for event in events:
+                adjacent[event].append(number)
         return tuple(map(tuple, adjacent))
 
     def is_detached(self, events: Iterable[int]) -> bool:

@@ -12,6 +12,7 @@ way.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
@@ -150,9 +151,11 @@ def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect
         initial = net.initial
     else:
         initial = tuple(next(p for p in g.places if net.tokens[p]) for g in net.gears)
-    starting: dict[int, list[int]] = {}
+    counts, starting = Counter(initial), dict[int, list[int]]()
     for robot, start in enumerate(initial):
-        starting.setdefault(start, []).append(robot)
+        alone = counts[start] == 1 == subject.net.places[start].size
+        if not alone or subject.slots[start] != (robot,):
+            starting.setdefault(start, []).append(robot)
     for place, robots in sorted(starting.items()):
         slots, at = subject.slots[place], subject.net.places[place]
         if at.size != len(robots) or sorted(slots) != robots:
