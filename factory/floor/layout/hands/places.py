@@ -315,8 +315,7 @@ def _covered(
     """On a side, an axis and a way along it, for each pad and point (radii, n): the share of the
     pad over which its bellows reach the surface, and the position of its face along the axis, on
     what stands out most under it [m]."""
-    (axis, way), sizes = side, np.array(radii)
-    rims, which = _rims(axis, tuple(radii))
+    (axis, way), sizes, (rims, which) = side, np.array(radii), _rims(side[0], tuple(radii))
     out = surfaces.outermost(parts, (rims[:, None] + points).reshape(-1, 3), side)
     out = out.reshape(len(rims), -1)[which].reshape(2 * RAYS + 1, len(sizes), -1)
     bodies = [body for part in parts for body in surfaces.bodies[part]]
@@ -328,20 +327,13 @@ def _covered(
 
 @cache
 def _rims(axis: int, radii: tuple[float, ...]) -> tuple[Array, Index]:
-    """Where in pads across an axis it is looked at what these cover (m, 3) [m], and which of it is
-    each place in each pad (13 n,): their middle is that of all."""
-    every = np.array(radii)[:, None] * _ring(axis)[:, None]
-    rims, which = np.unique(every.reshape(-1, 3), axis=0, return_inverse=True)
-    return rims, which
-
-
-@cache
-def _ring(axis: int) -> Array:
-    """The same in a pad of radius 1 (13, 3): on its rim, half-way there, and in its middle."""
+    """Where in pads across an axis it is looked at what these cover (m, 3) [m]: on their rims,
+    half-way there, and in their common middle; and which of it is each place in each (13 n,)."""
     turns, ring = np.arange(RAYS) * 2 * pi / RAYS, np.zeros((2 * RAYS + 1, 3))
     rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     ring[:-1, [a for a in range(3) if a != axis]] = np.concatenate([rim, rim / 2])
-    return ring
+    every = (np.array(radii)[:, None] * ring[:, None]).reshape(-1, 3)
+    return np.unique(every, axis=0, return_inverse=True)
 
 
 def strain(tip: Tip, side: tuple[int, int], radius: Array, load: tuple[Array, Array]) -> Array:
