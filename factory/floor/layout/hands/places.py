@@ -315,7 +315,7 @@ def _covered(
     """On a side, an axis and a way along it, for each pad and point (radii, n): the share of the
     pad over which its bellows reach the surface, and the position of its face along the axis, on
     what stands out most under it [m]."""
-    (axis, way), sizes, (rims, which) = side, np.array(radii), _rims(side[0], tuple(radii))
+    (_, way), sizes, (rims, which) = side, np.array(radii), _rims(side[0], tuple(radii))
     out = surfaces.outermost(parts, (rims[:, None] + points).reshape(-1, 3), side)
     out = out.reshape(len(rims), -1)[which].reshape(2 * RAYS + 1, len(sizes), -1)
     bodies = [body for part in parts for body in surfaces.bodies[part]]
