@@ -30,8 +30,8 @@ Way = tuple[float, float]
 TOUCH = 1e-5
 """Boxes that overlap by no more only touch [m]."""
 
-MANY = 1 << 16
-"""The most pairs of bodies and points that are looked at at a time."""
+MANY = 16
+"""So many boxes are looked at at a time for each point."""
 
 FEW = 4
 """Of more boxes than this those that are near are looked for first."""
@@ -187,12 +187,18 @@ class Surfaces:
         x, y = points[:, one].copy(), points[:, other].copy()
         every = self.near(parts, points, axis)
         boxes = np.array([(b.low, b.high) for b in every if b.boxed]).reshape(-1, 2, 3)
-        for some in np.array_split(boxes, len(boxes) * len(x) // MANY + 1):
-            low, high = some[:, 0], some[:, 1]
-            over = (x >= low[:, one, None]) & (x <= high[:, one, None])
-            over &= (y >= low[:, other, None]) & (y <= high[:, other, None])
-            ends = way * (high if way > 0 else low)[:, axis, None]
-            reach = np.maximum(reach, np.where(over, ends, -np.inf).max(axis=0, initial=-np.inf))
+        ends = way * boxes[:, 1 if way > 0 else 0, axis]
+        order, left = np.argsort(-ends), np.arange(len(points))
+        for begin in range(0, len(order), MANY):  # the outermost first: what meets one is done
+            some = order[begin : begin + MANY, None]
+            (low, high), u, v = np.moveaxis(boxes[some], 2, 0), x[left], y[left]
+            over = (u >= low[..., one]) & (u <= high[..., one])
+            over &= (v >= low[..., other]) & (v <= high[..., other])
+            met = over.any(axis=0)
+            reach[left[met]] = ends[some[over[:, met].argmax(axis=0), 0]]
+            left = left[~met]
+            if not len(left):
+                break
         bodies = [(body.out(side), body) for body in every if not body.boxed]
         for out, body in sorted(bodies, key=lambda pair: -pair[0]):
             low, high = body.low, body.high
