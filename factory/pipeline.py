@@ -141,10 +141,8 @@ class Project:
             return (self,)
         from factory.theory.compiler.mixing import lowered_alike
 
-        made = self.with_plan(self._single)
-        alone = [made.with_pag(self.pag.product(x)) for x in self.pag.products]
-        for project in alone:
-            project.__dict__["product"] = self.product
+        made, pag = self.with_plan(self._single), self.pag
+        alone = [made.with_pag(pag.product(x)).with_product(self.product) for x in pag.products]
         for number, lowered in lowered_alike([project.approached for project in alone]).items():
             alone[number] = alone[number]._changed({"product"}, lowered=lowered)
         return tuple(alone)
@@ -243,21 +241,22 @@ class Project:
 
         lifts, (_, place) = lifts_for(self._unlifted, self.catalogue), on_stems(factory)
         plan = replace(plan, lifts=frozenset(r for r, at in enumerate(place) if at in lifts))
-        if not plan.lifts:
-            return replace(factory, plan=plan)
-        return shared(self.approached, plan, self.catalogue)
+        return self._shared(plan) if plan.lifts else replace(factory, plan=plan)
 
     @cached_property
     def planned(self) -> Factory:
         """The same, but for lifts of robots with several tours."""
         if self.plan.turns or self.plan.names or self.plan.tees:
-            return shared(self.approached, self.plan, self.catalogue)
+            return self._shared(self.plan)
         if self.pag.mix is None:
             return self.compiled
         from factory.floor.layout.sequencing import sequenced
 
         inputs = self.pag.mix, self.product, self.catalogue, self.settings
-        return shared(self.approached, sequenced(self.approached, *inputs), self.catalogue)
+        return self._shared(sequenced(self.approached, *inputs))
+
+    def _shared(self, plan: Plan) -> Factory:
+        return shared(self.approached, plan, self.catalogue)
 
     @cached_property
     def approached(self) -> Factory:
@@ -293,9 +292,9 @@ class Project:
 
     @property
     def unshaped(self) -> Factory:
-        """The factory of the plan without regard to shapes: no mesh is read. Raises InputError."""
-        parts = self.pag, self.templates, self.catalogue
-        return shared(compile_pag(*parts, {}, self.plan), self.plan, self.catalogue)
+        """The factory of the plan without regard to shapes: no mesh is read. Raises as `plain`."""
+        made = compile_pag(self.pag, self.templates, self.catalogue, {}, self.plan)
+        return shared(made, self.plan, self.catalogue)
 
     @cached_property
     def layout(self) -> Layout:
@@ -334,7 +333,8 @@ class Project:
 
     @property
     def factory(self) -> Factory:
-        """The factory with the relays of its layout if its ground asks for them, else `plain`."""
+        """The factory with the relays of its layout if its ground asks for them, else the plain
+        one. Raises as these do."""
         return self.layout.factory if self.ground.relays else self.plain
 
 

@@ -14,12 +14,12 @@ import json
 import os
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from factory.support.files import user_cache, write_bytes
+from factory.support.tables import SIMPLE, fields_of
 from factory.support.version import release
 
 __all__ = ["digest"]
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
 
 MOST = 500_000_000
 """The most bytes that the entries of a folder take together."""
-
-ATOMS = frozenset({str, int, float, bool, type(None)})
-"""Types of values whose `repr` differs where they differ."""
 
 SUFFIX = ".entry"
 """The ending of the files of entries."""
@@ -65,33 +62,25 @@ def digest(*parts: object) -> str:
 
 def content(value: Any, seen: dict[int, str] | None = None) -> object:
     """What `digest` tells a value by, whatever holds it: a digest of a dataclass by the fields that
-    are compared, and of an array; tuples of what is in a mapping, a tuple or a set; else the value
-    itself. `seen`: the digests of dataclasses that the value shares with others, by their
-    identities."""
+    are compared, and of an array; a tuple, a mapping or a sorted list of what is in a tuple, a
+    mapping or a set; else the value itself. `seen`: the digests of dataclasses that the value
+    shares with others, by their identities."""
     kind: Any = type(value)
-    if kind in ATOMS:
+    if kind in SIMPLE:
         return value
     seen = {} if seen is None else seen
-    if (names := _compared(kind)) is not None:
+    if held := fields_of(kind):
         if id(value) not in seen:
-            parts = [content(getattr(value, name), seen) for name in names]
+            parts = [content(getattr(value, each.name), seen) for each in held if each.compare]
             seen[id(value)] = digest(kind.__qualname__, *parts)
         return seen[id(value)]
     if isinstance(value, Mapping):
-        return "mapping", *[(content(k, seen), content(v, seen)) for k, v in value.items()]
+        return {content(key, seen): content(one, seen) for key, one in value.items()}
     if isinstance(value, tuple | list):
         return tuple([content(one, seen) for one in value])
     if isinstance(value, set | frozenset):
-        return "set", *sorted([repr(content(one, seen)) for one in value])
+        return sorted([repr(content(one, seen)) for one in value])
     return digest(value) if hasattr(value, "dtype") else value
-
-
-@cache
-def _compared(kind: Any) -> tuple[str, ...] | None:
-    """The names of the fields of a dataclass that are compared; None for another type."""
-    if not is_dataclass(kind):
-        return None
-    return tuple(field.name for field in fields(kind) if field.compare)
 
 
 @cache

@@ -47,6 +47,9 @@ WORDS = {bool: "true or false", str: "a text", NoneType: "null"} | {
 }
 """Values of simple types in words."""
 
+SIMPLE = frozenset(WORDS)
+"""The simple types."""
+
 
 def table_of(value: Any) -> Any:
     """The JSON value of a value: a table for a dataclass, with the fields that differ from their
@@ -56,9 +59,9 @@ def table_of(value: Any) -> Any:
         value: a dataclass, mapping, tuple, set, text or number.
     """
     kind: Any = type(value)
-    if kind in WORDS:
+    if kind in SIMPLE:
         return value
-    if held := _fields_of(kind):
+    if held := fields_of(kind):
         pairs = [(field, getattr(value, field.name)) for field in held]
         return {f.name: table_of(v) for f, v in pairs if not _is_default(f, v)}
     if isinstance(value, Mapping):
@@ -69,7 +72,7 @@ def table_of(value: Any) -> Any:
 
 
 @cache
-def _fields_of(kind: Any) -> tuple[Field[Any], ...]:
+def fields_of(kind: Any) -> tuple[Field[Any], ...]:
     """The fields of a dataclass; none of another type."""
     return fields(kind) if is_dataclass(kind) else ()
 

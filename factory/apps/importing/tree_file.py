@@ -159,10 +159,12 @@ class TreeReader:
             hint = "mate the children in a node of their own first"
             self.faults.add("WrongInputs", message, at, hint)
         draft.operation = name
-        draft.parameters = self._parameters(fields.get("parameters"), template)
+        draft.parameters = self._parameters(fields.get("parameters"), name, operation.parameters)
 
-    def _parameters(self, node: Node | None, template: Template) -> tuple[Parameter, ...]:
-        made, kinds = list[Parameter](), template.signature.parameters
+    def _parameters(
+        self, node: Node | None, operation: str, kinds: Mapping[str, ParameterKind]
+    ) -> tuple[Parameter, ...]:
+        made: list[Parameter] = []
         if node is not None and node.kind != "object":
             message = f"'parameters' takes an object, not {node.words}"
             hint = 'for example "parameters": {"dwell": 2}'
@@ -172,7 +174,7 @@ class TreeReader:
                 kind = kinds.get(str(key.content))
                 if kind is None:
                     hint = did_you_mean(str(key.content), list(kinds), "parameters")
-                    message = f"{quoted(template.name)} has no parameter {key.words}"
+                    message = f"{quoted(operation)} has no parameter {key.words}"
                     self.faults.add("UnknownParameter", message, key.position, hint)
                 elif (content := self._value(str(key.content), kind, value)) is not None:
                     made.append(Parameter(key.content, content))

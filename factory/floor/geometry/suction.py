@@ -29,9 +29,6 @@ SHARE = 0.25
 PLACES = 9
 """The number of candidate places along each side of a part."""
 
-EVEN = 5e-5
-"""The tolerance for equal heights [m], half a gap."""
-
 HIGHEST = 128
 """Of the triangles over a place so many are looked at at a time, those that reach highest first."""
 
@@ -111,6 +108,10 @@ class PadPlace:
     @classmethod
     def _at(cls, place: Corner, top: float, radius: float, level: bool = False) -> PadPlace:
         return cls(np.array([*place, top + cls.GAP]), radius, level)
+
+
+EVEN = PadPlace.GAP / 2
+"""The tolerance for equal heights [m]."""
 
 
 def _grid(solid: Solid, radius: float) -> Array:

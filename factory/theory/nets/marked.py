@@ -26,7 +26,7 @@ MANY = TransitionId(-2)
 """The producer or consumer of a place that has several."""
 
 FEW = 8
-"""Up to so many gears through a place are counted one by one."""
+"""The gears through a place are collected in a list from so many on."""
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class MarkedNet(Pictured):
             for place in gear.places:
                 on = owners[place]
                 if len(on) < FEW:
-                    owners[place] = on + alone if on else alone
+                    owners[place] = on + alone
                 else:
                     shared.setdefault(place, [*on]).append(number)
         for several, gears in shared.items():

@@ -264,7 +264,7 @@ class Factory(Pictured):
     def begun_by(self, robot: int) -> list[RobotId]:
         """The robots (index) that bring what a robot's tour begins with; none at a feeder."""
         first = self.first(robot)
-        return [other for other in first.robots if other != robot] * (first.carrier == robot)
+        return [r for r in first.robots if r != robot] if first.carrier == robot else []
 
     def sides(self, robot: int) -> set[int]:
         """Sides of the approach axis from which a robot (index) may come to where it delivers."""

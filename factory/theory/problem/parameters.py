@@ -83,6 +83,7 @@ GEOMETRY: Mapping[str, ParameterKind] = MappingProxyType(
         "fed": ParameterKind(1, "0.61", low=-3.15, high=3.15),
     }
 )
+"""The kinds of the parameters of a part, by name."""
 
 ParameterKind.GEOMETRY = GEOMETRY
 

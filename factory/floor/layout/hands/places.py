@@ -318,7 +318,7 @@ def _covered(
     (_, way), sizes, (rims, which) = side, np.array(radii), _rims(side[0], tuple(radii))
     out = surfaces.outermost(parts, (rims[:, None] + points).reshape(-1, 3), side)
     out = out.reshape(len(rims), -1)[which].reshape(2 * RAYS + 1, len(sizes), -1)
-    bodies = surfaces.near(parts, points, side[0], max(radii))
+    bodies = [body for part in parts for body in surfaces.bodies[part]]
     discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
     most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])
     reached = most - out <= BELLOWS * sizes[:, None]

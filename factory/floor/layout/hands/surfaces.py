@@ -30,8 +30,8 @@ Way = tuple[float, float]
 TOUCH = 1e-5
 """Boxes that overlap by no more only touch [m]."""
 
-MANY = 16
-"""So many boxes are looked at at a time for each point."""
+BLOCK = 16
+"""So many boxes are compared with points at a time."""
 
 FEW = 4
 """Of more boxes than this those that are near are looked for first."""
@@ -166,31 +166,18 @@ class Surfaces:
         """The boxes (n, 2, 3) of the bodies of some parts."""
         return np.concatenate([self._boxes[part] for part in parts])
 
-    def near(
-        self, parts: Sequence[str], points: Array, axis: int, reach: float = 0.0
-    ) -> list[Body]:
-        """The bodies of some parts that lines along an axis near some points (n, 3) may meet, no
-        further away than `reach` [m]; more than these where there are few."""
-        bodies = [body for part in parts for body in self.bodies[part]]
-        if len(bodies) <= FEW or not len(points):
-            return bodies
-        boxes, across = self.boxes(parts), [a for a in range(3) if a != axis]
-        low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
-        meets = (boxes[:, 1] >= low) & (boxes[:, 0] <= high)
-        return [bodies[n] for n in np.flatnonzero(meets[:, across].all(axis=1))]
-
     def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
         """Extent of some parts on a side, an axis and a way (+1, -1) along it, where lines along
         the axis through points (n, 3) meet them (n,) [m]; -inf for lines that miss them."""
         (axis, way), reach = side, np.full(len(points), -np.inf)
         one, other = (a for a in range(3) if a != axis)
         x, y = points[:, one].copy(), points[:, other].copy()
-        every = self.near(parts, points, axis)
+        every = [body for part in parts for body in self.bodies[part]]
         boxes = np.array([(b.low, b.high) for b in every if b.boxed]).reshape(-1, 2, 3)
         ends = way * boxes[:, 1 if way > 0 else 0, axis]
         order, left = np.argsort(-ends), np.arange(len(points))
-        for begin in range(0, len(order), MANY):  # the outermost first: what meets one is done
-            some = order[begin : begin + MANY, None]
+        for begin in range(0, len(order), BLOCK):  # outermost first: a line that meets one is done
+            some = order[begin : begin + BLOCK, None]
             (low, high), u, v = np.moveaxis(boxes[some], 2, 0), x[left], y[left]
             over = (u >= low[..., one]) & (u <= high[..., one])
             over &= (v >= low[..., other]) & (v <= high[..., other])
