@@ -11,8 +11,10 @@ from factory.floor.layout.carrying_back import not_carried_back
 from factory.floor.layout.crowding import separation
 from factory.floor.layout.sweeps import piles_of
 from factory.floor.robots.catalogue import load_catalogue
+from factory.pipeline import Project
 from factory.support.errors import InputError
 from factory.theory.compiler.compiler import compile_pag
+from factory.theory.lang.pag_reader import read_pag
 from factory.theory.problem.pag import PAG
 from factory.theory.problem.robot_types import Catalogue
 from tests.examples import with_hands
@@ -48,6 +50,15 @@ def test_the_papers_example_has_the_gears_of_the_paper() -> None:
     assert operations["sub1"] == [5, 6, 3]
     assert operations["sub2"] == [3, 4]
     assert operations["sub3"] == [3, 2, 1]
+
+
+def test_a_factory_is_compiled_where_its_meshes_are_gone(tmp_path) -> None:
+    text = "root = s; s = mate(a, b); a = atomic(); b = atomic({})"
+    pag = read_pag(text.format('mesh = "gone.stl"'), TEMPLATES, str(tmp_path / "x.pag"), None)
+    project = Project(pag, TEMPLATES)
+    assert gears(project.unshaped) == gears(compiled(text.format("")))
+    with pytest.raises(InputError):
+        _ = project.plain
 
 
 def test_numbering_gives_small_inputs_first_and_tools_last() -> None:

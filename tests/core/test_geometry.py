@@ -18,6 +18,7 @@ from factory.floor.geometry.overlap import MODULES, is_seen_near, may_share
 from factory.floor.geometry.overlapping import Overlapping
 from factory.floor.geometry.product import product_geometry
 from factory.floor.geometry.solids import Product
+from factory.floor.layout.hands.surfaces import BLOCK, Surfaces
 from factory.support.errors import InputError
 from factory.theory.problem.pag import PAG, Value
 from tests.layout_values import table_pag
@@ -32,6 +33,27 @@ def from_mesh(folder: Path, mesh: trimesh.Trimesh | str, **given: Value) -> Prod
         mesh.export(folder / "m.obj")
     pag = table_pag("p", ("p", "atomic", "", {"mesh": "m.obj", **given}))
     return product_geometry(PAG(pag.root, pag.nodes, folder=str(folder)))
+
+
+@pytest.mark.parametrize("side", [(0, 1), (0, -1), (1, 1), (2, 1), (2, -1)])
+def test_lines_meet_the_outermost_of_many_boxes(side: tuple[int, int]) -> None:
+    """More boxes than are compared at a time; against each box by itself."""
+    rng = np.random.default_rng(7)
+    size, middle = rng.uniform(0.02, 0.1, (3 * BLOCK, 3)), rng.uniform(-0.3, 0.3, (3 * BLOCK, 3))
+    rows = [
+        (f"p{n}", "atomic", "", {"box": tuple(s), "pos": tuple(p)})
+        for n, (s, p) in enumerate(zip(size.tolist(), middle.tolist(), strict=True))
+    ]
+    surfaces = Surfaces(product_geometry(table_pag("p0", *rows)))
+    points, labels, (axis, way) = rng.uniform(-0.4, 0.4, (500, 3)), [*surfaces.bodies], side
+    across = [a for a in range(3) if a != axis]
+    low, high = surfaces.boxes(labels).swapaxes(0, 1)
+    over = (points[:, None, across] >= low[:, across]) & (
+        points[:, None, across] <= high[:, across]
+    )
+    ends = np.where(over.all(axis=2), way * (high if way > 0 else low)[:, axis], -np.inf)
+    found = surfaces.outermost(labels, points, side)
+    assert np.array_equal(found, ends.max(axis=1)) and 0 < np.isfinite(found).sum() < len(points)
 
 
 def test_a_mesh_file_scaled_turned_and_placed(tmp_path: Path) -> None:

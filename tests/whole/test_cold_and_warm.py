@@ -7,11 +7,13 @@ import subprocess
 import sys
 from collections import Counter
 from contextlib import redirect_stdout
+from dataclasses import dataclass, field
 from io import StringIO
 from pathlib import Path
 from typing import Any
 from xml.sax import saxutils
 
+import numpy as np
 import pytest
 import trimesh
 from hypothesis import given, settings
@@ -28,7 +30,7 @@ from factory.floor.layout.saved import LayoutTable
 from factory.floor.mating.finder import Finder
 from factory.pipeline import read as read_project
 from factory.support import console as console_module
-from factory.support.cache import load, store
+from factory.support.cache import content, digest, load, store
 from factory.support.files import user_cache
 from factory.support.tables import table_of
 from factory.theory.lang import pag_syntax
@@ -221,6 +223,28 @@ def test_a_layout_is_searched_once(
         laid(file)
     monkeypatch.setattr(embedding, "drafted", searched)
     assert laid(file) == found
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A value with two fields that are compared, and one that is not."""
+
+    one: object
+    other: object
+    note: str = field(default="", compare=False)
+
+
+def test_what_differs_has_another_digest() -> None:
+    two, three = np.arange(2), np.arange(3)
+    differing = [
+        *(Pair(1, 2), Pair(2, 2), Pair(1, 3), Pair(Pair(1, 2), 3), Pair(1, 1.0), Pair(1, True)),
+        *("a", 1, 1.0, True, None, two, three, two.astype(float), two.reshape(1, 2)),
+        *((), ("a",), ("a", 1), (("a", 1),), ("a", (1,)), (two,), (three,)),
+        *({}, {"a": 1}, {"a": 2}, {"a": (1,)}, frozenset({"a"}), frozenset({"a", "b"})),
+    ]
+    assert len({digest(content(value)) for value in differing}) == len(differing)
+    assert content(Pair(1, two)) == content(Pair(1, np.arange(2), "noted"))
+    assert content(["a", {1, 2}]) == content(("a", frozenset({2, 1})))
 
 
 def printed_table(*table: Any) -> str:

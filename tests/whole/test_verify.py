@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from factory.apps.foreign_nets.behaviour import analyse
 from factory.apps.foreign_nets.explore import explore
 from factory.theory.nets.gears import Gear, GearNet
-from factory.theory.nets.marked import MarkedNet
+from factory.theory.nets.marked import FEW, MarkedNet
 from factory.theory.nets.verdict import Verdict, Witness
 from factory.theory.plant.factory import Factory
 from tests.net_values import PHILOSOPHERS, crossed_twice, net_from, planted
@@ -123,6 +123,23 @@ def test_slots_of_a_marked_place_that_are_not_of_the_robots_there() -> None:
         last = verdict.witness[-1]
         assert (last.property, last.kind) == ("legal", "slots")
         assert "the robots that start there are r3" in last.reason
+
+
+def test_a_marked_place_has_room_for_the_robots_that_start_there() -> None:
+    net = MarkedNet.of(factory_of(paper()).net)
+    place, places = net.tokens.index(1), [*net.net.places]
+    places[place] = replace(places[place], size=2)
+    verdict = analyse(replace(net, net=replace(net.net, places=tuple(places))))
+    assert verdict.legal is False
+    assert "acts on 2 robots" in witness(verdict, "slots").reason
+    assert {"gear_net", "legal"} <= {one.property for one in verdict.witness}
+
+
+def test_all_gears_through_a_place_are_its_owners() -> None:
+    """More than `FEW` of them, too, of which others are alone."""
+    gears = tuple(Gear(f"r{n}", "dot", (0, n + 1), (0, 1)) for n in range(2 * FEW))
+    net = net_from([("a", "b", 0), *[("b", "a", 1)] * len(gears)])
+    assert replace(net, gears=gears).owners == ((*range(2 * FEW),), *((n,) for n in range(2 * FEW)))
 
 
 def test_a_net_with_choice_is_explored() -> None:
